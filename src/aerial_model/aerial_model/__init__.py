@@ -1,0 +1,1 @@
+"""The robot as data, and the quantities exchanged about it."""

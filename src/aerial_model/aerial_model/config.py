@@ -1,0 +1,118 @@
+"""Configuration as data: YAML mappings become frozen dataclasses, and a misspelt key is an error that lists the known ones."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar, get_type_hints
+
+import numpy as np
+import yaml
+
+from aerial_model.errors import ConfigurationError
+
+T = TypeVar("T")
+
+
+def load_yaml(path: Path) -> dict[str, Any]:
+    """Return the mapping a YAML file holds.
+
+    Raises:
+        ConfigurationError: if the file is missing, is no YAML, or holds anything but a mapping.
+    """
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigurationError(f"{path}: cannot be read ({error.strerror})") from None
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ConfigurationError(f"{path}: not valid YAML ({' '.join(str(error).split())})") from None
+    if not isinstance(content, dict):
+        raise ConfigurationError(f"{path}: expected a mapping of keys to values, found {type(content).__name__}")
+    return content
+
+
+def closest(name: str, known: Iterable[str]) -> str:
+    """Return ``" (did you mean 'x'?)"`` for the known name nearest to ``name``, or an empty string."""
+    matches = difflib.get_close_matches(name, list(known), n=1)
+    return f" (did you mean '{matches[0]}'?)" if matches else ""
+
+
+def check_keys(mapping: Mapping[str, Any], required: Iterable[str], optional: Iterable[str], where: str) -> None:
+    """Check that ``mapping`` has all required keys and no unknown one.
+
+    Raises:
+        ConfigurationError: naming the key, the place and the keys that are known there.
+    """
+    required, optional = list(required), list(optional)
+    known = required + optional
+    for key in mapping:
+        if key not in known:
+            raise ConfigurationError(f"{where}: unknown key '{key}'{closest(str(key), known)}; known: {', '.join(known)}")
+    for key in required:
+        if key not in mapping:
+            raise ConfigurationError(f"{where}: key '{key}' is missing; required: {', '.join(required)}")
+
+
+def from_mapping(cls: type[T], mapping: Any, where: str) -> T:
+    """Build a (nested) frozen dataclass from a YAML mapping.
+
+    Fields without a default are required. Numbers become ``float``/``int``, lists of numbers become read-only arrays,
+    mappings become the dataclass the field is annotated with.
+
+    Args:
+        cls: the dataclass.
+        mapping: what the YAML holds for it.
+        where: file and key path, for error messages.
+
+    Raises:
+        ConfigurationError: for a missing or unknown key or a value of the wrong kind.
+    """
+    if not isinstance(mapping, Mapping):
+        raise ConfigurationError(f"{where}: expected a mapping, found {mapping!r}")
+    fields = {field.name: field for field in dataclasses.fields(cls) if field.init}  # type: ignore[arg-type]
+    has_default = {
+        name: field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
+        for name, field in fields.items()
+    }
+    check_keys(mapping, [n for n in fields if not has_default[n]], [n for n in fields if has_default[n]], where)
+    hints = get_type_hints(cls)
+    try:
+        return cls(**{key: _convert(hints[key], value, f"{where}: {key}") for key, value in mapping.items()})
+    except ValueError as error:
+        raise ConfigurationError(f"{where}: {error}") from None
+
+
+def _convert(kind: Any, value: Any, where: str) -> Any:
+    if dataclasses.is_dataclass(kind) and isinstance(kind, type):
+        return from_mapping(kind, value, where)
+    if kind is np.ndarray:
+        return frozen_array(value, where)
+    if kind in (int, float):
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+            raise ConfigurationError(f"{where}: expected a finite number, found {value!r}")
+        if kind is int and value != int(value):
+            raise ConfigurationError(f"{where}: expected a whole number, found {value!r}")
+        return kind(value)
+    if kind in (str, bool) and not isinstance(value, kind):
+        raise ConfigurationError(f"{where}: expected {kind.__name__}, found {value!r}")
+    return tuple(value) if isinstance(value, list) else value
+
+
+def frozen_array(value: Any, where: str = "array", shape: tuple[int, ...] | None = None) -> np.ndarray:
+    """Return ``value`` as a read-only float array, checked to be finite and, if given, of ``shape``.
+
+    Raises:
+        ConfigurationError: if it is no array of finite numbers or has another shape.
+    """
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ConfigurationError(f"{where}: expected numbers, found {value!r}") from None
+    if not np.all(np.isfinite(array)):
+        raise ConfigurationError(f"{where}: expected finite numbers, found {value!r}")
+    if shape is not None and array.shape != shape:
+        raise ConfigurationError(f"{where}: expected shape {shape}, found {array.shape}")
+    array.flags.writeable = False
+    return array

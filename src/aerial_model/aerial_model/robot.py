@@ -1,0 +1,322 @@
+"""A robot is data: a folder with ``robot.urdf`` and ``robot.yaml``; Pinocchio, CasADi and MuJoCo models all come from it."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import pinocchio as pin
+
+from aerial_model.actuator import ActuatorLaw
+from aerial_model.config import check_keys, closest, from_mapping, frozen_array, load_yaml
+from aerial_model.contact import ContactPoint
+from aerial_model.errors import ConfigurationError
+from aerial_model.rotation import IDENTITY, heading
+
+T = TypeVar("T")
+
+BASE_POSITION = slice(0, 3)  # in q
+BASE_ORIENTATION = slice(3, 7)  # in q
+JOINT_POSITION = slice(7, None)  # in q
+BASE_TWIST = slice(0, 6)  # in v
+BASE_LINEAR = slice(0, 3)  # in v
+BASE_ANGULAR = slice(3, 6)  # in v
+JOINT_VELOCITY = slice(6, None)  # in v
+
+URDF_NAME = "robot.urdf"
+YAML_NAME = "robot.yaml"
+_REQUIRED_POSES = ("home", "landing", "tuck")
+_SECTIONS = ("planner", "controller", "sensors")  # each read, as a dataclass of its own, by the package it is for
+
+
+@dataclass(frozen=True, kw_only=True)
+class _ActuatorEntry:
+    """One kind of actuator in ``robot.yaml``; units as in ``ActuatorLaw``."""
+
+    joints: tuple
+    gear_ratio: float
+    torque_max: float
+    torque_constant: float
+    back_emf_constant: float
+    resistance: float
+    rotor_inertia: float
+    damping: float
+    dry_friction: float
+
+    def __post_init__(self) -> None:
+        for name in ("gear_ratio", "torque_max", "torque_constant", "back_emf_constant", "resistance"):
+            if getattr(self, name) <= 0:
+                raise ValueError(f"{name} must be positive, found {getattr(self, name)}")
+        for name in ("rotor_inertia", "damping", "dry_friction"):
+            if getattr(self, name) < 0:
+                raise ValueError(f"{name} must not be negative, found {getattr(self, name)}")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Robot:
+    """Everything that is known about a robot, loaded by ``Robot.load``."""
+
+    name: str
+    folder: Path
+    model: pin.Model  # with a free-flyer base; rotor inertia as armature
+    joint_names: tuple[str, ...]  # actuated joints in the order of q and v
+    contact_points: tuple[ContactPoint, ...]
+    contact_frames: tuple[int, ...]  # Pinocchio frame of each contact point
+    actuators: ActuatorLaw
+    poses: Mapping[str, np.ndarray]  # name → joint positions (n,) [rad]
+    planning_range: tuple[np.ndarray, np.ndarray]  # least and greatest joint position of a plan, (n,) each [rad]
+    frozen_joints: np.ndarray  # (n,) bool, see robot.yaml
+    friction_coefficient: float  # that planner and controller count on
+    model_hash: str  # of both files' content: a plan is for exactly this robot
+    sections: Mapping[str, Any]  # the rest of robot.yaml, unparsed
+
+    @property
+    def n_joints(self) -> int:
+        """Number of actuated joints."""
+        return len(self.joint_names)
+
+    @property
+    def n_contacts(self) -> int:
+        """Number of contact points."""
+        return len(self.contact_points)
+
+    @property
+    def mass(self) -> float:
+        """Total mass [kg]."""
+        return float(pin.computeTotalMass(self.model))
+
+    @property
+    def urdf(self) -> Path:
+        """Path of the robot's URDF."""
+        return self.folder / URDF_NAME
+
+    def section(self, name: str, cls: type[T]) -> T:
+        """Return a section of ``robot.yaml`` as the dataclass that reads it.
+
+        Raises:
+            ConfigurationError: for a missing or unknown key.
+        """
+        return from_mapping(cls, self.sections.get(name, {}), f"{self.folder / YAML_NAME}: {name}")
+
+    def with_section(self, name: str, **changes: Any) -> Robot:
+        """Return this robot with keys of a section replaced, as ``--set section.key=value`` asks."""
+        sections = {**self.sections, name: {**self.sections.get(name, {}), **changes}}
+        return dataclasses.replace(self, sections=sections)
+
+    def standing_configuration(self, pose: str = "home") -> np.ndarray:
+        """Return q ``(nq,)`` in a named pose, level, its support centre at the origin and the lowest contact on z = 0."""
+        q = np.concatenate([np.zeros(3), IDENTITY, self.poses[pose]])
+        points = self.contact_positions(q)
+        radii = np.array([point.radius for point in self.contact_points])
+        q[:2] = -points[:, :2].mean(axis=0)
+        q[2] = -np.min(points[:, 2] - radii)
+        return q
+
+    def contact_positions(self, q: np.ndarray) -> np.ndarray:
+        """Return the centres of the contact spheres ``(n_c, 3)`` [m] in W at configuration ``q`` ``(nq,)``."""
+        data = self.model.createData()
+        pin.framesForwardKinematics(self.model, data, q)
+        return np.array([data.oMf[frame].translation for frame in self.contact_frames])
+
+    def start_frame(self, q: np.ndarray) -> tuple[np.ndarray, float]:
+        """Return the start heading frame of a robot that stands at ``q`` ``(nq,)``.
+
+        Returns:
+            origin ``(3,)`` [m], the centre of the support on the ground, and the heading [rad], both in the frame of q.
+        """
+        radii = np.array([point.radius for point in self.contact_points])
+        origin = self.contact_positions(q).mean(axis=0) - [0.0, 0.0, radii.mean()]
+        return origin, heading(q[BASE_ORIENTATION])
+
+    @staticmethod
+    def load(name_or_folder: str | Path) -> Robot:
+        """Return the robot of that name among those that come with this package, or of that folder.
+
+        Raises:
+            ConfigurationError: with one sentence about what is missing, unknown or implausible.
+        """
+        return _load(find_folder(name_or_folder))
+
+
+def known_robots() -> dict[str, Path]:
+    """Return the robots that come with this package: name → folder."""
+    root = Path(str(resources.files("aerial_model"))) / "robots"
+    return {folder.name: folder for folder in sorted(root.iterdir()) if (folder / YAML_NAME).is_file()}
+
+
+def find_folder(name_or_folder: str | Path) -> Path:
+    """Return the folder of a robot given by name or path.
+
+    Raises:
+        ConfigurationError: if there is none, with the names that exist.
+    """
+    known = known_robots()
+    if str(name_or_folder) in known:
+        return known[str(name_or_folder)]
+    folder = Path(name_or_folder).expanduser()
+    if not folder.is_dir():
+        raise ConfigurationError(
+            f"no robot '{name_or_folder}'{closest(str(name_or_folder), known)}: "
+            f"expected a folder or one of {', '.join(known)}"
+        )
+    for name in (URDF_NAME, YAML_NAME):
+        if not (folder / name).is_file():
+            raise ConfigurationError(f"robot folder {folder}: {name} is missing")
+    return folder.resolve()
+
+
+def _load(folder: Path) -> Robot:
+    where = str(folder / YAML_NAME)
+    data = load_yaml(folder / YAML_NAME)
+    check_keys(
+        data,
+        required=[
+            *("name", "contact_points", "bus_voltage", "actuators", "poses", "planning_range"),
+            "friction_coefficient",
+        ],
+        optional=["frozen_joints", *_SECTIONS],
+        where=where,
+    )
+    model = _pinocchio_model(folder / URDF_NAME)
+    joints = tuple(str(name) for name in model.names[2:])
+    actuators = _actuator_law(data["actuators"], joints, data["bus_voltage"], where)
+    model.armature = np.concatenate([np.zeros(6), actuators.armature])
+    points = _contact_points(data["contact_points"], model, where)
+    return Robot(
+        name=str(data["name"]),
+        folder=folder,
+        model=model,
+        joint_names=joints,
+        contact_points=points,
+        contact_frames=tuple(model.getFrameId(point.frame) for point in points),
+        actuators=actuators,
+        poses=_poses(data, joints, where),
+        planning_range=_planning_range(data, joints, where),
+        frozen_joints=_frozen_joints(data.get("frozen_joints", []), joints, where),
+        friction_coefficient=_positive(data["friction_coefficient"], f"{where}: friction_coefficient"),
+        model_hash=_content_hash(folder),
+        sections={name: data[name] for name in _SECTIONS if name in data},
+    )
+
+
+def _pinocchio_model(urdf: Path) -> pin.Model:
+    try:
+        model = pin.buildModelFromUrdf(str(urdf), pin.JointModelFreeFlyer())
+    except (ValueError, RuntimeError) as error:
+        raise ConfigurationError(f"{urdf}: not a URDF that Pinocchio can read ({error})") from None
+    for joint_id in range(2, model.njoints):
+        joint = model.joints[joint_id]
+        if joint.nq != 1 or joint.nv != 1:
+            raise ConfigurationError(
+                f"{urdf}: joint '{model.names[joint_id]}' is of kind {joint.shortname()}; "
+                "expected a revolute or prismatic joint with limits"
+            )
+    return model
+
+
+def _actuator_law(kinds: Any, joints: tuple[str, ...], bus_voltage: Any, where: str) -> ActuatorLaw:
+    if not isinstance(kinds, Mapping):
+        raise ConfigurationError(f"{where}: actuators: expected a mapping of kinds, found {kinds!r}")
+    entry_of: dict[str, _ActuatorEntry] = {}
+    for kind, mapping in kinds.items():
+        entry = from_mapping(_ActuatorEntry, mapping, f"{where}: actuators: {kind}")
+        for joint in entry.joints:
+            if joint not in joints:
+                raise ConfigurationError(
+                    f"{where}: actuators: {kind}: the URDF has no joint '{joint}'{closest(str(joint), joints)}; "
+                    f"it has {', '.join(joints)}"
+                )
+            if joint in entry_of:
+                raise ConfigurationError(f"{where}: actuators: joint '{joint}' is listed twice")
+            entry_of[joint] = entry
+    missing = [joint for joint in joints if joint not in entry_of]
+    if missing:
+        raise ConfigurationError(f"{where}: actuators: no entry for joint {', '.join(missing)}")
+    names = [field.name for field in dataclasses.fields(_ActuatorEntry) if field.name != "joints"]
+    columns = {name: frozen_array([getattr(entry_of[joint], name) for joint in joints]) for name in names}
+    voltage = _positive(bus_voltage, f"{where}: bus_voltage")
+    return ActuatorLaw(bus_voltage=frozen_array(np.full(len(joints), voltage)), **columns)
+
+
+def _contact_points(entries: Any, model: pin.Model, where: str) -> tuple[ContactPoint, ...]:
+    if not isinstance(entries, list) or not entries:
+        raise ConfigurationError(f"{where}: contact_points: expected a list of points, found {entries!r}")
+    points = tuple(
+        from_mapping(ContactPoint, entry, f"{where}: contact_points[{i}]") for i, entry in enumerate(entries)
+    )
+    for point in points:
+        if not model.existFrame(point.frame, pin.FrameType.BODY):
+            raise ConfigurationError(
+                f"{where}: contact_points: {point.name}: the URDF has no link '{point.frame}'"
+                f"{closest(point.frame, [frame.name for frame in model.frames])}"
+            )
+        if point.radius <= 0:
+            raise ConfigurationError(f"{where}: contact_points: {point.name}: radius must be positive")
+    if len({point.name for point in points}) != len(points):
+        raise ConfigurationError(f"{where}: contact_points: names must differ")
+    return points
+
+
+def _per_joint(values: Any, kinds: Mapping[str, Any], joints: tuple[str, ...], where: str, shape: tuple[int, ...]) -> np.ndarray:
+    """Return ``(n, *shape)`` from a mapping that names kinds of actuators, or single joints (which win over kinds)."""
+    if not isinstance(values, Mapping):
+        raise ConfigurationError(f"{where}: expected a mapping of joint kinds or joints to values, found {values!r}")
+    kind_of = {joint: kind for kind, entry in kinds.items() for joint in entry["joints"]}
+    for name in values:
+        if name not in kinds and name not in joints:
+            known = [*kinds, *joints]
+            raise ConfigurationError(f"{where}: unknown joint or kind '{name}'{closest(str(name), known)}; known: {', '.join(known)}")
+    rows = []
+    for joint in joints:
+        name = joint if joint in values else kind_of[joint]
+        if name not in values:
+            raise ConfigurationError(f"{where}: no value for joint '{joint}' (kind '{kind_of[joint]}')")
+        rows.append(frozen_array(values[name], f"{where}: {name}", shape))
+    return frozen_array(rows)
+
+
+def _poses(data: Mapping[str, Any], joints: tuple[str, ...], where: str) -> dict[str, np.ndarray]:
+    poses = data["poses"]
+    if not isinstance(poses, Mapping):
+        raise ConfigurationError(f"{where}: poses: expected a mapping of names to joint angles, found {poses!r}")
+    for name in _REQUIRED_POSES:
+        if name not in poses:
+            raise ConfigurationError(f"{where}: poses: '{name}' is missing; required: {', '.join(_REQUIRED_POSES)}")
+    return {
+        name: _per_joint(pose, data["actuators"], joints, f"{where}: poses: {name}", ()) for name, pose in poses.items()
+    }
+
+
+def _planning_range(data: Mapping[str, Any], joints: tuple[str, ...], where: str) -> tuple[np.ndarray, np.ndarray]:
+    bounds = _per_joint(data["planning_range"], data["actuators"], joints, f"{where}: planning_range", (2,))  # (n, 2)
+    if np.any(bounds[:, 0] >= bounds[:, 1]):
+        raise ConfigurationError(f"{where}: planning_range: the first number of a pair must be the smaller one")
+    return frozen_array(bounds[:, 0]), frozen_array(bounds[:, 1])
+
+
+def _frozen_joints(names: Any, joints: tuple[str, ...], where: str) -> np.ndarray:
+    for name in names:
+        if name not in joints:
+            raise ConfigurationError(f"{where}: frozen_joints: the URDF has no joint '{name}'{closest(name, joints)}")
+    mask = np.array([joint in names for joint in joints])
+    mask.flags.writeable = False
+    return mask
+
+
+def _positive(value: Any, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not value > 0:
+        raise ConfigurationError(f"{where}: expected a positive number, found {value!r}")
+    return float(value)
+
+
+def _content_hash(folder: Path) -> str:
+    digest = hashlib.sha256()
+    for name in (URDF_NAME, YAML_NAME):
+        digest.update((folder / name).read_bytes())
+    return digest.hexdigest()[:16]

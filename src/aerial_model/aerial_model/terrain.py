@@ -1,0 +1,87 @@
+"""The ground: a flat floor plus boxes (platforms, hurdles, steps), all in one frame.
+
+The floor lies at height 0, or at the lowest box bottom where that is below: a start on top of a platform is a box whose
+upper face is at 0, so that the floor around it is a step down.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from aerial_model import rotation
+from aerial_model.config import frozen_array
+
+PLATFORM_LENGTH = 0.9  # [m] along the jump: a stance and room to land off the goal
+PLATFORM_WIDTH = 0.9  # [m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Box:
+    """A box standing on (or sunk into) the ground, turned by ``yaw`` about z."""
+
+    centre: np.ndarray  # (3,) [m]
+    size: np.ndarray  # (3,) full side lengths [m]
+    yaw: float = 0.0  # [rad]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centre", frozen_array(self.centre, "box centre", (3,)))
+        object.__setattr__(self, "size", frozen_array(self.size, "box size", (3,)))
+        if np.any(self.size <= 0) or not np.isfinite(self.yaw):
+            raise ValueError(f"a box needs positive side lengths and a finite yaw, found size {self.size}, yaw {self.yaw}")
+
+    @property
+    def top(self) -> float:
+        """Height of the upper face [m]."""
+        return float(self.centre[2] + self.size[2] / 2)
+
+    def covers(self, points: np.ndarray, margin: float = 0.0) -> np.ndarray:
+        """Return for points ``(..., 2+)`` [m] whether they lie over the box, grown by ``margin`` [m] to all sides."""
+        c, s = np.cos(self.yaw), np.sin(self.yaw)
+        offset = np.asarray(points)[..., :2] - self.centre[:2]
+        local = np.stack([c * offset[..., 0] + s * offset[..., 1], -s * offset[..., 0] + c * offset[..., 1]], axis=-1)
+        return np.all(np.abs(local) <= self.size[:2] / 2 + margin, axis=-1)
+
+    def placed(self, origin: np.ndarray, yaw: float) -> Box:
+        """Return this box when the frame it is expressed in stands at ``origin`` ``(3,)`` [m], turned by ``yaw`` [rad]."""
+        centre = np.asarray(origin) + rotation.matrix(rotation.about_z(yaw)) @ self.centre
+        return Box(centre=centre, size=self.size, yaw=self.yaw + yaw)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Terrain:
+    """A flat floor and boxes on it, in the start heading frame unless said otherwise."""
+
+    boxes: tuple[Box, ...] = field(default_factory=tuple)
+
+    @staticmethod
+    def platform(height: float, edge: float, direction: float) -> Terrain:
+        """Return a platform to jump onto, or, with a negative ``height`` [m], one to jump off.
+
+        Args:
+            height: of the landing above the start [m], not 0.
+            edge: distance from the origin, along the jump, to the near edge of the platform jumped onto or to the far
+                edge of the one jumped off [m].
+            direction: of the jump, angle from x [rad].
+        """
+        middle = edge + PLATFORM_LENGTH / 2 if height > 0 else edge - PLATFORM_LENGTH / 2
+        centre = np.array([middle * np.cos(direction), middle * np.sin(direction), height / 2])
+        return Terrain(boxes=(Box(centre=centre, size=np.array([PLATFORM_LENGTH, PLATFORM_WIDTH, abs(height)]), yaw=direction),))
+
+    @property
+    def floor(self) -> float:
+        """Height of the flat floor [m]."""
+        return min([0.0, *(float(box.centre[2] - box.size[2] / 2) for box in self.boxes)])
+
+    def height(self, points: np.ndarray, margin: float = 0.0) -> np.ndarray:
+        """Return the height [m] of the ground under points ``(..., 2+)`` [m], boxes grown by ``margin`` [m]."""
+        points = np.asarray(points)
+        ground = np.full(points.shape[:-1], self.floor)
+        for box in self.boxes:
+            ground = np.where(box.covers(points, margin), np.maximum(ground, box.top), ground)
+        return ground
+
+    def placed(self, origin: np.ndarray, yaw: float) -> Terrain:
+        """Return the terrain expressed in a frame where its own stands at ``origin`` ``(3,)``, turned by ``yaw``."""
+        return Terrain(boxes=tuple(box.placed(origin, yaw) for box in self.boxes))
