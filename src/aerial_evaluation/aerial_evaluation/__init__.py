@@ -1,0 +1,1 @@
+"""The loop closed in one process: scenarios, campaigns, tables."""

@@ -1,0 +1,19 @@
+from setuptools import find_packages, setup
+
+PACKAGE = "aerial_model"
+
+setup(
+    name=PACKAGE,
+    version="0.1.0",
+    description="The robot as data, and the quantities exchanged about it.",
+    maintainer="Aerial maintainers",
+    maintainer_email="maintainers@aerial.invalid",
+    license="Apache-2.0",
+    packages=find_packages(),
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
+        (f"share/{PACKAGE}", ["package.xml"]),
+    ],
+    package_data={PACKAGE: ["robots/*/*.urdf", "robots/*/*.yaml", "robots/*/meshes/*"]},
+    zip_safe=False,
+)

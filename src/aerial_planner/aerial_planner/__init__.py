@@ -1,0 +1,1 @@
+"""From a motion and a goal to a checked plan."""

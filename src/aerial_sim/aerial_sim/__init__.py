@@ -1,0 +1,1 @@
+"""From joint torques to measurements: the robot and its world in MuJoCo."""
