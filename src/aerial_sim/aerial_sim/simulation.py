@@ -1,0 +1,238 @@
+"""The robot's stand-in: torque commands in, measurements out, the actuator law between, MuJoCo below.
+
+One ``step`` is one control period. Within it the drives close their own loop at every physics step, as motor boards do:
+set-point to requested torque, the actuator law to delivered torque, MuJoCo to motion. Equal seeds and equal commands give
+equal measurements to the last bit.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from aerial_model import rotation
+from aerial_model.errors import ConfigurationError
+from aerial_model.robot import (
+    BASE_ANGULAR,
+    BASE_LINEAR,
+    BASE_ORIENTATION,
+    BASE_POSITION,
+    JOINT_POSITION,
+    JOINT_VELOCITY,
+    Robot,
+)
+from aerial_model.state import Command, Measurement
+from aerial_model.terrain import Terrain
+from aerial_sim.contacts import ContactSensing
+from aerial_sim.drive import Drive
+from aerial_sim.ground_truth import GroundTruth
+from aerial_sim.sensors import Sensors, SensorNoise
+from aerial_sim.world import FRICTION_COEFFICIENT, World, build
+
+PHYSICS_DT = 0.0005  # [s]
+CONTROL_DT = 0.002  # [s]
+START_OFFSET = np.radians(1.0)  # largest error of the joints' starting positions with noise [rad]
+
+
+class Simulation:
+    """A robot in its world; W has z up and the floor at the terrain's floor.
+
+    Args:
+        robot: whose model, actuators and sensors are simulated.
+        terrain: expressed in W.
+        noise: ``"nominal"`` or ``"off"``; ``"off"`` also starts exactly in the home pose, heading along x.
+        seed: of noise, biases, starting joint offsets and heading.
+        physics_dt: MuJoCo's step [s].
+        control_dt: period of commands and measurements [s], a multiple of ``physics_dt``.
+
+    Raises:
+        ConfigurationError: for an unknown noise, periods that do not fit, or a URDF that MuJoCo cannot use.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        *,
+        terrain: Terrain = Terrain(),
+        noise: str = "nominal",
+        seed: int = 0,
+        physics_dt: float = PHYSICS_DT,
+        control_dt: float = CONTROL_DT,
+    ) -> None:
+        steps = round(control_dt / physics_dt)
+        if steps < 1 or not np.isclose(steps * physics_dt, control_dt, rtol=1e-9, atol=0.0):
+            raise ConfigurationError(f"control period {control_dt} s is no multiple of the physics step {physics_dt} s")
+        self.robot = robot
+        self.control_dt = control_dt
+        self._physics_dt = physics_dt
+        self._steps = steps
+        self._noise = SensorNoise.of(robot, noise)
+        self._start_offset = 0.0 if noise == "off" else START_OFFSET
+        self._start_heading = 0.0 if noise == "off" else np.pi
+        self._drive = Drive(robot.actuators, steps)
+        self._added_mass = 0.0
+        self._friction_coefficient = FRICTION_COEFFICIENT
+        self._use(build(robot, terrain, physics_dt))
+        self.reset(seed)
+
+    def reset(self, seed: int) -> Measurement:
+        """Put the robot in its home pose, its lowest foot on the ground, at time 0, and draw everything anew."""
+        random = np.random.default_rng(seed)
+        self._sensors = Sensors(self._noise, self.robot.n_joints, random)
+        q = self.robot.standing_configuration()
+        q[JOINT_POSITION] += random.uniform(-self._start_offset, self._start_offset, self.robot.n_joints)
+        turn = rotation.about_z(random.uniform(-self._start_heading, self._start_heading))
+        q[BASE_POSITION] = rotation.matrix(turn) @ q[BASE_POSITION]
+        q[BASE_ORIENTATION] = turn
+        points = self.robot.contact_positions(q)
+        radii = np.array([point.radius for point in self.robot.contact_points])
+        q[2] += np.max(self.terrain.height(points) - (points[:, 2] - radii))
+        mujoco.mj_resetData(self._world.model, self._data)
+        self.set_state(q, np.zeros(self.robot.model.nv))
+        self._ticks = 0
+        self._push_until = 0.0
+        self._drive.clear()
+        self._contacts.clear()
+        self._contacts.collect(self._data)
+        self._measurement = self._measured(-self._world.model.opt.gravity)
+        return self._measurement
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self._ticks * self.control_dt
+
+    @property
+    def terrain(self) -> Terrain:
+        """The terrain, in W."""
+        return self._world.terrain
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """MuJoCo's model, for pictures and tests; replaced by ``set_terrain``."""
+        return self._world.model
+
+    def step(self, command: Command) -> Measurement:
+        """Advance by one control period under ``command`` and return what the sensors then say."""
+        world, model, data = self._world, self._world.model, self._data
+        self._contacts.clear()
+        velocity_0 = data.qvel[BASE_LINEAR].copy()
+        if self.time >= self._push_until:
+            data.xfrc_applied[world.trunk] = 0.0
+        for k in range(self._steps):
+            data.ctrl[:] = self._drive.torque(k, command, data.qpos[world.joint_qpos], data.qvel[world.joint_dof])
+            mujoco.mj_step(model, data)
+            self._contacts.collect(data)
+        self._ticks += 1
+        mean_acceleration = (data.qvel[BASE_LINEAR] - velocity_0) / self.control_dt
+        self._measurement = self._measured(mean_acceleration - model.opt.gravity)
+        return self._measurement
+
+    def measure(self) -> Measurement:
+        """Return the last measurement again."""
+        return self._measurement
+
+    def set_terrain(self, terrain: Terrain) -> None:
+        """Replace the terrain (in W) under the running robot; its state, the time and all disturbances stay."""
+        state = np.empty(mujoco.mj_stateSize(self._world.model, mujoco.mjtState.mjSTATE_INTEGRATION))
+        mujoco.mj_getState(self._world.model, self._data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
+        self._use(build(self.robot, terrain, self._physics_dt))
+        mujoco.mj_setState(self._world.model, self._data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
+        mujoco.mj_forward(self._world.model, self._data)
+
+    def disturb(
+        self,
+        force: np.ndarray | None = None,
+        duration: float = 0.0,
+        *,
+        added_mass: float | None = None,
+        friction_coefficient: float | None = None,
+    ) -> None:
+        """Push the trunk, load it, or change the ground; what is not given stays as it is.
+
+        Args:
+            force: ``(3,)`` [N] in W at the trunk's centre of mass.
+            duration: how long it acts, from now, in whole control periods [s].
+            added_mass: fixed to the trunk's centre of mass from now on, replacing what was added before [kg].
+            friction_coefficient: of the ground from now on.
+        """
+        if force is not None:
+            self._data.xfrc_applied[self._world.trunk, :3] = force
+            self._push_until = self.time + duration
+        if added_mass is not None:
+            self._added_mass = added_mass
+        if friction_coefficient is not None:
+            self._friction_coefficient = friction_coefficient
+        self._apply_changes()
+
+    def ground_truth(self) -> GroundTruth:
+        """Return what is really so, contacts and torques over the last control period included."""
+        q, v = self.state()
+        return GroundTruth(
+            time=self.time,
+            q=q,
+            v=v,
+            contact=self._contacts.points,
+            force=self._contacts.forces(self._data),
+            other_contacts=self._contacts.other_links,
+            trunk_contact=self._contacts.trunk,
+            requested_torque=self._drive.requested_torque,
+            delivered_torque=self._drive.delivered_torque,
+            peak_torque_ratio=self._drive.peak_torque_ratio,
+            peak_voltage_ratio=self._drive.peak_voltage_ratio,
+        )
+
+    def state(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the true q ``(nq,)`` and v ``(nv,)`` in Pinocchio's order, base twist in B."""
+        qpos, qvel = self._data.qpos, self._data.qvel
+        orientation = np.roll(qpos[BASE_ORIENTATION], -1)  # MuJoCo: w first
+        R_WB = rotation.matrix(orientation)
+        q = np.concatenate([qpos[BASE_POSITION], orientation, qpos[self._world.joint_qpos]])
+        linear = R_WB.T @ qvel[BASE_LINEAR]  # MuJoCo: linear in W, angular in B
+        v = np.concatenate([linear, qvel[BASE_ANGULAR], qvel[self._world.joint_dof]])
+        return q, v
+
+    def set_state(self, q: np.ndarray, v: np.ndarray) -> None:
+        """Put the robot at q ``(nq,)`` and v ``(nv,)`` in Pinocchio's order; time goes on."""
+        data = self._data
+        data.qpos[BASE_POSITION] = q[BASE_POSITION]
+        data.qpos[BASE_ORIENTATION] = np.roll(q[BASE_ORIENTATION], 1)
+        data.qpos[self._world.joint_qpos] = q[JOINT_POSITION]
+        data.qvel[BASE_LINEAR] = rotation.matrix(q[BASE_ORIENTATION]) @ v[BASE_LINEAR]
+        data.qvel[BASE_ANGULAR] = v[BASE_ANGULAR]
+        data.qvel[self._world.joint_dof] = v[JOINT_VELOCITY]
+        mujoco.mj_forward(self._world.model, data)
+
+    def _measured(self, specific_force: np.ndarray) -> Measurement:
+        """Return the sensors' reading of the present; ``specific_force`` ``(3,)`` [m/s²] at the base origin, in W.
+
+        The accelerometer reports the mean over the last period, as an inertial unit that filters below the sampling
+        rate does, so that its integral is the true change of velocity, impacts included.
+        """
+        q, v = self.state()
+        R_WB = rotation.matrix(q[BASE_ORIENTATION])
+        return Measurement(
+            time=self.time,
+            orientation=self._sensors.orientation(q[BASE_ORIENTATION]),
+            angular_velocity=self._sensors.angular_velocity(v[BASE_ANGULAR]),
+            linear_acceleration=self._sensors.linear_acceleration(R_WB.T @ specific_force),
+            joint_position=self._sensors.joint_position(q[JOINT_POSITION]),
+            joint_velocity=self._sensors.joint_velocity(v[JOINT_VELOCITY]),
+            joint_torque=self._drive.delivered_torque,
+            sequence=self._ticks,
+        )
+
+    def _use(self, world: World) -> None:
+        """Make ``world`` the current one."""
+        self._world = world
+        self._data = mujoco.MjData(world.model)
+        self._contacts = ContactSensing(world)
+        self._model_trunk_mass = float(world.model.body_mass[world.trunk])
+        self._apply_changes()
+
+    def _apply_changes(self) -> None:
+        """Give the model the added mass and the ground's friction asked for."""
+        model = self._world.model
+        model.geom_friction[self._world.ground_geoms, 0] = self._friction_coefficient
+        model.body_mass[self._world.trunk] = self._model_trunk_mass + self._added_mass
+        mujoco.mj_setConst(model, mujoco.MjData(model))

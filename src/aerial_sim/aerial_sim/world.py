@@ -1,0 +1,158 @@
+"""The MuJoCo model of a robot on a terrain, built from the robot's folder, so that it agrees with Pinocchio's.
+
+What is chosen here, and why:
+
+* The URDF gives bodies, inertias, joints and shapes; ``robot.yaml`` gives armature, damping, dry friction and contact
+  points. Torque limits are not MuJoCo's business: the drive applies the one actuator law before the torque gets here.
+* Contact is as stiff as the step allows (time constant of two steps, impedance 0.95 … 0.99): a standing robot sinks
+  in by micrometres. The elliptic friction cone with ``impratio`` 100 keeps a loaded foot from creeping.
+* ``implicitfast`` treats joint damping implicitly; with a 0.5 ms step the flight conserves momentum to 1e-4.
+* The robot's links collide with the world and with one another, except neighbours in the tree (MuJoCo's own rule).
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from aerial_model.errors import ConfigurationError
+from aerial_model.robot import Robot
+from aerial_model.rotation import about_z
+from aerial_model.terrain import Terrain
+from aerial_sim import scenery
+
+FRICTION_COEFFICIENT = 0.7  # of the world; planner and controller count on less, see robot.yaml
+IMPEDANCE = (0.95, 0.99, 0.001, 0.5, 2.0)  # MuJoCo's solimp of the ground
+IMPEDANCE_RATIO = 100.0  # friction over normal stiffness
+STEPS_PER_TIME_CONSTANT = 2.0  # the stiffest contact MuJoCo keeps stable
+SOLVER_TOLERANCE = 1e-10
+WORLD_BODY = 0  # MuJoCo's id of the body all terrain belongs to
+ROBOT_SHAPE_GROUP = 3  # MuJoCo draws groups 0 to 2 unless told otherwise
+ROBOT_LOOKS_GROUP = 2
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class World:
+    """A compiled model, and where the robot's quantities lie in it; arrays in the robot's own order."""
+
+    model: mujoco.MjModel
+    terrain: Terrain
+    joint_qpos: np.ndarray  # (n,) index into qpos
+    joint_dof: np.ndarray  # (n,) index into qvel
+    contact_geoms: np.ndarray  # (n_c,) id of each contact point's sphere
+    trunk: int  # id of the robot's root body
+    ground_geoms: np.ndarray  # ids of floor and boxes
+
+
+def build(robot: Robot, terrain: Terrain, physics_dt: float) -> World:
+    """Return the world of ``robot`` on ``terrain`` (expressed in W), to be stepped by ``physics_dt`` [s].
+
+    Raises:
+        ConfigurationError: if MuJoCo cannot make a model of the robot's URDF.
+    """
+    try:
+        spec = mujoco.MjSpec.from_string(_urdf_with_looks(robot))
+        root = spec.worldbody.first_body()
+        root.add_freejoint(name="root")
+        _set_options(spec, physics_dt)
+        _set_joints(spec, robot)
+        _set_shapes(spec)
+        contact_names = _add_contact_points(spec, robot)
+        ground_names = _add_ground(spec, terrain, physics_dt)
+        scenery.add(spec)
+        trunk_name = root.name
+        model = spec.compile()
+    except (ValueError, RuntimeError) as error:
+        raise ConfigurationError(f"{robot.urdf}: MuJoCo cannot use it ({' '.join(str(error).split())})") from None
+    return World(
+        model=model,
+        terrain=terrain,
+        joint_qpos=np.array([model.joint(name).qposadr[0] for name in robot.joint_names]),
+        joint_dof=np.array([model.joint(name).dofadr[0] for name in robot.joint_names]),
+        contact_geoms=np.array([model.geom(name).id for name in contact_names]),
+        trunk=model.body(trunk_name).id,
+        ground_geoms=np.array([model.geom(name).id for name in ground_names]),
+    )
+
+
+def _urdf_with_looks(robot: Robot) -> str:
+    """Return the URDF's text, told to keep its visual shapes and to weld fixed links onto their parents."""
+    tree = ElementTree.parse(robot.urdf).getroot()
+    settings = {"discardvisual": "false", "fusestatic": "true", "meshdir": str(robot.folder), "strippath": "false"}
+    ElementTree.SubElement(ElementTree.SubElement(tree, "mujoco"), "compiler", settings)
+    return ElementTree.tostring(tree, encoding="unicode")
+
+
+def _set_options(spec: mujoco.MjSpec, physics_dt: float) -> None:
+    spec.option.timestep = physics_dt
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.impratio = IMPEDANCE_RATIO
+    spec.option.tolerance = SOLVER_TOLERANCE
+
+
+def _set_joints(spec: mujoco.MjSpec, robot: Robot) -> None:
+    law = robot.actuators
+    for i, name in enumerate(robot.joint_names):
+        joint = spec.joint(name)
+        joint.armature = law.armature[i]
+        joint.damping[0] = law.damping[i]
+        joint.frictionloss = law.dry_friction[i]
+        joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
+        motor = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        motor.set_to_motor()
+
+
+def _set_shapes(spec: mujoco.MjSpec) -> None:
+    for geom in spec.geoms:
+        collides = geom.contype != 0
+        geom.group = ROBOT_SHAPE_GROUP if collides else ROBOT_LOOKS_GROUP
+
+
+def _add_contact_points(spec: mujoco.MjSpec, robot: Robot) -> list[str]:
+    names = []
+    for point in robot.contact_points:
+        names.append(f"contact {point.name}")
+        spec.body(point.frame).add_geom(
+            name=names[-1],
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            size=[point.radius, 0, 0],
+            group=ROBOT_SHAPE_GROUP,
+            mass=0,
+        )
+    return names
+
+
+def _add_ground(spec: mujoco.MjSpec, terrain: Terrain, physics_dt: float) -> list[str]:
+    surface = {
+        "condim": 3,
+        "priority": 1,  # the ground's parameters hold, whatever the robot's shapes say
+        "friction": [FRICTION_COEFFICIENT, 0.0, 0.0],
+        "solref": [STEPS_PER_TIME_CONSTANT * physics_dt, 1.0],
+        "solimp": IMPEDANCE,
+    }
+    names = ["floor"]
+    spec.worldbody.add_geom(
+        name="floor",
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        pos=[0, 0, terrain.floor],
+        size=[0, 0, 1],  # infinite
+        material=scenery.FLOOR_MATERIAL,
+        **surface,
+    )
+    for i, box in enumerate(terrain.boxes):
+        x, y, z, w = about_z(box.yaw)
+        names.append(f"box {i}")
+        spec.worldbody.add_geom(
+            name=names[-1],
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=box.centre,
+            quat=[w, x, y, z],
+            size=box.size / 2,
+            material=scenery.BOX_MATERIAL,
+            **surface,
+        )
+    return names
