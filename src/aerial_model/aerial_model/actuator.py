@@ -12,6 +12,7 @@ The rotor reflects as armature g_r² I_rotor; the gear adds viscous damping and 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -30,27 +31,27 @@ class ActuatorLaw:
     damping: np.ndarray  # [N·m·s/rad]
     dry_friction: np.ndarray  # [N·m]
 
-    @property
+    @cached_property
     def armature(self) -> np.ndarray:
         """Rotor inertia reflected to the joint, g_r² I ``(n,)`` [kg·m²]."""
         return self.gear_ratio**2 * self.rotor_inertia
 
-    @property
+    @cached_property
     def volts_per_torque(self) -> np.ndarray:
         """R / (k_τ g_r) ``(n,)`` [V/(N·m)]."""
         return self.resistance / (self.torque_constant * self.gear_ratio)
 
-    @property
+    @cached_property
     def volts_per_speed(self) -> np.ndarray:
         """k_e g_r ``(n,)`` [V·s/rad]."""
         return self.back_emf_constant * self.gear_ratio
 
-    @property
+    @cached_property
     def no_load_speed(self) -> np.ndarray:
         """Joint speed at which the bus voltage leaves no torque ``(n,)`` [rad/s]."""
         return self.bus_voltage / self.volts_per_speed
 
-    @property
+    @cached_property
     def corner_speed(self) -> np.ndarray:
         """Highest joint speed at which the full torque is available ``(n,)`` [rad/s]."""
         return (self.bus_voltage - self.torque_max * self.volts_per_torque) / self.volts_per_speed
@@ -68,12 +69,12 @@ class ActuatorLaw:
         lower = (-self.bus_voltage - back_emf) / self.volts_per_torque
         upper = (self.bus_voltage - back_emf) / self.volts_per_torque
         limit = self.torque_max
-        return np.clip(lower, -limit, limit), np.clip(upper, -limit, limit)
+        return np.maximum(np.minimum(lower, limit), -limit), np.maximum(np.minimum(upper, limit), -limit)
 
     def available(self, torque: np.ndarray, speed: np.ndarray) -> np.ndarray:
         """Return the torque ``(..., n)`` [N·m] the motors deliver when ``torque`` is asked for at joint ``speed``."""
         lower, upper = self.torque_bounds(speed)
-        return np.clip(torque, lower, upper)
+        return np.maximum(np.minimum(torque, upper), lower)
 
     def friction(self, speed: np.ndarray, stiction_speed: float) -> np.ndarray:
         """Return the joint torque ``(..., n)`` [N·m] that damping and dry friction take at joint ``speed`` [rad/s].

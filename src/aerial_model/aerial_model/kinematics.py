@@ -31,7 +31,10 @@ class Kinematics:
 
 
 class Configuration:
-    """Quantities of a robot at one state, in W with Pinocchio's v (base twist in B, linear first)."""
+    """Quantities of a robot at one state, in W with Pinocchio's v (base twist in B, linear first).
+
+    Arrays are handed out as copies: Pinocchio's own would change with the next state, or outlive their memory.
+    """
 
     def __init__(self, robot: Robot, data: pin.Data, q: np.ndarray, v: np.ndarray) -> None:
         self.robot = robot
@@ -48,7 +51,7 @@ class Configuration:
     @property
     def nle(self) -> np.ndarray:
         """Non-linear effects C q̇ + G ``(nv,)``."""
-        return self._data.nle
+        return self._data.nle.copy()
 
     @property
     def base_position(self) -> np.ndarray:
@@ -63,17 +66,17 @@ class Configuration:
     @property
     def R_WB(self) -> np.ndarray:  # noqa: N802
         """Base attitude as a matrix ``(3, 3)``."""
-        return self._data.oMi[1].rotation
+        return self._data.oMi[1].rotation.copy()
 
     @property
     def com(self) -> np.ndarray:
         """Centre of mass r ``(3,)`` [m]."""
-        return self._data.com[0]
+        return self._data.com[0].copy()
 
     @property
     def com_velocity(self) -> np.ndarray:
         """Velocity of the centre of mass ṙ ``(3,)`` [m/s]."""
-        return self._data.vcom[0]
+        return self._data.vcom[0].copy()
 
     @property
     def A_G(self) -> np.ndarray:  # noqa: N802
@@ -84,7 +87,7 @@ class Configuration:
     @property
     def angular_momentum(self) -> np.ndarray:
         """Centroidal angular momentum α ``(3,)`` [kg·m²/s]."""
-        return self._data.hg.angular
+        return self._data.hg.angular.copy()
 
     @property
     def Adot_v_G(self) -> np.ndarray:  # noqa: N802
@@ -93,7 +96,7 @@ class Configuration:
 
     def contact_position(self, i: int) -> np.ndarray:
         """Centre of contact sphere ``i``: c_i ``(3,)`` [m]."""
-        return self._data.oMf[self.robot.contact_frames[i]].translation
+        return self._data.oMf[self.robot.contact_frames[i]].translation.copy()
 
     @property
     def contact_positions(self) -> np.ndarray:

@@ -31,6 +31,7 @@ from aerial_sim.world import FRICTION_COEFFICIENT, World, build
 
 PHYSICS_DT = 0.0005  # [s]
 CONTROL_DT = 0.002  # [s]
+XYZW = [4, 5, 6, 3]  # the base quaternion in qpos, where MuJoCo has w first
 START_OFFSET = np.radians(1.0)  # largest error of the joints' starting positions with noise [rad]
 
 
@@ -185,10 +186,8 @@ class Simulation:
     def state(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the true q ``(nq,)`` and v ``(nv,)`` in Pinocchio's order, base twist in B."""
         qpos, qvel = self._data.qpos, self._data.qvel
-        orientation = np.roll(qpos[BASE_ORIENTATION], -1)  # MuJoCo: w first
-        R_WB = rotation.matrix(orientation)
-        q = np.concatenate([qpos[BASE_POSITION], orientation, qpos[self._world.joint_qpos]])
-        linear = R_WB.T @ qvel[BASE_LINEAR]  # MuJoCo: linear in W, angular in B
+        q = np.concatenate([qpos[BASE_POSITION], qpos[XYZW], qpos[self._world.joint_qpos]])
+        linear = self._R_WB().T @ qvel[BASE_LINEAR]  # MuJoCo: linear in W, angular in B
         v = np.concatenate([linear, qvel[BASE_ANGULAR], qvel[self._world.joint_dof]])
         return q, v
 
@@ -196,9 +195,9 @@ class Simulation:
         """Put the robot at q ``(nq,)`` and v ``(nv,)`` in Pinocchio's order; time goes on."""
         data = self._data
         data.qpos[BASE_POSITION] = q[BASE_POSITION]
-        data.qpos[BASE_ORIENTATION] = np.roll(q[BASE_ORIENTATION], 1)
+        data.qpos[XYZW] = q[BASE_ORIENTATION]
         data.qpos[self._world.joint_qpos] = q[JOINT_POSITION]
-        data.qvel[BASE_LINEAR] = rotation.matrix(q[BASE_ORIENTATION]) @ v[BASE_LINEAR]
+        data.qvel[BASE_LINEAR] = self._R_WB() @ v[BASE_LINEAR]
         data.qvel[BASE_ANGULAR] = v[BASE_ANGULAR]
         data.qvel[self._world.joint_dof] = v[JOINT_VELOCITY]
         mujoco.mj_forward(self._world.model, data)
@@ -210,17 +209,22 @@ class Simulation:
         rate does, so that its integral is the true change of velocity, impacts included.
         """
         q, v = self.state()
-        R_WB = rotation.matrix(q[BASE_ORIENTATION])
         return Measurement(
             time=self.time,
             orientation=self._sensors.orientation(q[BASE_ORIENTATION]),
             angular_velocity=self._sensors.angular_velocity(v[BASE_ANGULAR]),
-            linear_acceleration=self._sensors.linear_acceleration(R_WB.T @ specific_force),
+            linear_acceleration=self._sensors.linear_acceleration(self._R_WB().T @ specific_force),
             joint_position=self._sensors.joint_position(q[JOINT_POSITION]),
             joint_velocity=self._sensors.joint_velocity(v[JOINT_VELOCITY]),
             joint_torque=self._drive.delivered_torque,
             sequence=self._ticks,
         )
+
+    def _R_WB(self) -> np.ndarray:  # noqa: N802
+        """Attitude of the base ``(3, 3)``."""
+        R = np.empty(9)
+        mujoco.mju_quat2Mat(R, self._data.qpos[BASE_ORIENTATION])
+        return R.reshape(3, 3)
 
     def _use(self, world: World) -> None:
         """Make ``world`` the current one."""
