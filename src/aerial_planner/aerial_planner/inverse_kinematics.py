@@ -1,0 +1,45 @@
+"""Joint angles that put the contact points where they should be: damped Gauss–Newton over many configurations at once."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from aerial_model.robot import Robot
+from aerial_planner.symbolic import BaseFrameModel
+
+_ITERATIONS = 12
+_DAMPING = 1e-4  # [m²/rad²]
+_STEP_MAX = 0.5  # [rad] per iteration
+
+
+class InverseKinematics:
+    """Solves for the feet's positions relative to the centre of mass, in base axes."""
+
+    def __init__(self, robot: Robot, model: BaseFrameModel) -> None:
+        q = ca.MX.sym("q", robot.n_joints)
+        relative = ca.reshape(model.feet(q) - ca.repmat(model.com(q), 1, robot.n_contacts), -1, 1)
+        self._feet = ca.Function("feet_from_com", [q], [relative, ca.densify(ca.jacobian(relative, q))])
+        self._range = robot.planning_range
+
+    def solve(self, feet_from_com: np.ndarray, guess: np.ndarray) -> np.ndarray:
+        """Return joint positions ``(K, n)`` [rad] inside the planning range.
+
+        Args:
+            feet_from_com: wanted foot positions ``(K, n_c, 3)`` [m] from the centre of mass, in B.
+            guess: ``(n,)`` or ``(K, n)``.
+        """
+        targets = feet_from_com.reshape(len(feet_from_com), -1)
+        n_rows = targets.shape[1]
+        q = np.broadcast_to(guess, (len(targets), np.shape(guess)[-1])).copy()
+        n = q.shape[1]
+        for _ in range(_ITERATIONS):
+            feet, J = self._feet.map(len(q))(q.T)
+            error = targets - np.asarray(feet).T  # (K, 3 n_c)
+            J = np.asarray(J).T.reshape(len(q), n, n_rows)  # transposed blocks, Jᵀ of each
+            normal = J @ J.transpose(0, 2, 1) + _DAMPING * np.eye(n)
+            step = np.linalg.solve(normal, (J @ error[..., None]))[..., 0]
+            q = np.clip(q + np.clip(step, -_STEP_MAX, _STEP_MAX), *self._range)
+            if np.max(np.abs(error)) < 1e-6:
+                break
+        return q

@@ -1,0 +1,492 @@
+"""The kino-dynamic stage: thesis (3.1)–(3.14), reduced to what is independent, with the flight in the problem.
+
+Of the thesis's variables the centre of mass r, its velocity ṙ, the angular momentum α, the attitude and the joint angles
+are the state; body rate ω, joint rates q̇_j and forces f the control. The base position follows from r, so (3.7) holds
+by construction; accelerations and α̇ are expressions. What stays are the momentum agreement (3.8) and the fixed feet
+(3.9a), as equalities of a knot.
+
+    take-off knot   x = [r, ṙ, α, quaternion, q_j],   u = [ω, q̇_j, f of the loaded contacts]
+    flight knot     x = [α, quaternion, q_j],         u = [ω]
+
+In flight the legs follow a given path from the take-off pose through the tuck to the landing pose and turn the body
+against them; because these knots are in the problem, the attitude at touchdown is the goal's, legs included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import casadi as ca
+import numpy as np
+
+from aerial_model.contact import friction_pyramid
+from aerial_model.robot import Robot
+from aerial_planner.reference import Reference
+from aerial_planner.schedule import GRAVITY, Schedule
+from aerial_planner.settings import PlannerSettings
+from aerial_planner.symbolic import (
+    BaseFrameModel,
+    conjugate,
+    quaternion_product,
+    quaternion_step,
+    rotation_matrix,
+)
+from aerial_planner.transcription import Problem, Solution, SolverOptions, StageData, StageKind
+
+_NO_BOUND = np.inf
+_HALF_TURN_MARGIN = 0.5  # q_goal · q_land at least this: the attitude itself, not the one a full turn away
+
+
+class Variant(StrEnum):
+    """Which actuator constraints a plan obeys (thesis section 3.1.3)."""
+
+    KD = "KD"  # none
+    AAKD = "AAKD"  # (3.11) with the exact contact Jacobian
+    AAKD_STAR = "AAKD*"  # (3.11) with the Jacobian at frozen ab/adduction
+
+
+@dataclass(frozen=True, kw_only=True)
+class TakeOffTrajectory:
+    """What an optimization stage returns: K = N + 1 take-off knots and M + 1 flight knots, in S."""
+
+    com: np.ndarray  # (N+1, 3)
+    com_velocity: np.ndarray  # (N+1, 3)
+    angular_momentum: np.ndarray  # (N+1, 3)
+    orientation: np.ndarray  # (N+1, 4)
+    joint_position: np.ndarray  # (N+1, n)
+    angular_velocity: np.ndarray  # (N, 3) in B
+    joint_velocity: np.ndarray  # (N, n)
+    force: np.ndarray  # (N, n_c, 3)
+    flight_orientation: np.ndarray  # (M+1, 4)
+    flight_joint_position: np.ndarray  # (M+1, n)
+    flight_angular_velocity: np.ndarray  # (M, 3) in B
+
+
+class KinoDynamic:
+    """Builds and solves kino-dynamic problems of one robot and variant; a problem is built once per contact schedule."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        model: BaseFrameModel,
+        settings: PlannerSettings,
+        variant: Variant,
+        options: SolverOptions,
+    ) -> None:
+        self.robot = robot
+        self.model = model
+        self.settings = settings
+        self.variant = variant
+        self.options = options
+        self._problems: dict[bytes, Problem] = {}
+        self._kinds: dict[tuple, StageKind] = {}
+
+    def solve(self, schedule: Schedule, reference: Reference, guess: TakeOffTrajectory) -> tuple[TakeOffTrajectory, Solution]:
+        """Return the optimum near ``guess`` and the solver's account of it; check the latter before using the former."""
+        solution = self.problem(schedule).solve(self._stages(schedule, reference, guess))
+        return self._trajectory(schedule, solution), solution
+
+    def problem(self, schedule: Schedule) -> Problem:
+        """Return the problem of a schedule, built at its first use."""
+        key = schedule.contact.tobytes() + bytes([schedule.flight_knots])
+        if key not in self._problems:
+            kinds = [self._take_off_kind(*sets) for sets in _contact_sets(schedule)]
+            kinds.append(self._lift_off_kind(tuple(schedule.contact[-1])))
+            kinds += [self._flight_kind()] * (schedule.flight_knots - 1)
+            kinds.append(self._touchdown_kind())
+            self._problems[key] = Problem(kinds, self.options)
+        return self._problems[key]
+
+    # --- stage kinds: variables, objective, dynamics, constraints ---------------------------------------------------
+
+    def _take_off_kind(self, touching: tuple[bool, ...] | None, loaded: tuple[bool, ...]) -> StageKind:
+        """Return the knot whose ``touching`` contacts are held and ``loaded`` ones push; touching None: the first knot."""
+        key = ("take_off", touching, loaded)
+        if key in self._kinds:
+            return self._kinds[key]
+        robot, settings = self.robot, self.settings
+        n, n_c = robot.n_joints, robot.n_contacts
+        s = _TakeOffSymbols(robot, self.model, loaded)
+
+        dr = s.r - s.r_ref
+        dv = s.rdot - s.rdot_ref
+        turn = _attitude_error(s.quaternion, s.quaternion_ref)
+        dq = s.q_j - s.q_j_ref
+        w = settings.weights
+        cost = (
+            w.com * ca.sumsqr(dr)
+            + w.com_velocity * ca.sumsqr(dv)
+            + w.orientation * ca.sumsqr(turn)
+            + w.joint_position * ca.sumsqr(dq)
+            + w.angular_velocity * ca.sumsqr(s.omega)
+            + w.joint_velocity * ca.sumsqr(s.dq_j)
+            + w.force * ca.sumsqr(s.f)
+        )
+
+        rows = _Rows()
+        R = s.R
+        if touching is None:
+            rows.equal(s.x - s.x_0)
+        else:
+            feet = _world_feet(self.model, s)
+            for i in range(n_c):
+                if touching[i]:
+                    rows.equal(feet[:, i] - s.foot_ref[:, i])  # (3.9a)
+                elif not loaded[i]:
+                    rows.between(feet[2, i] - s.foot_ref[2, i], 0.0, _NO_BOUND)  # (3.10)
+        rows.equal(R.T @ s.alpha - self.model.angular_momentum(s.q_j, s.omega, s.dq_j))  # (3.8)
+        pyramid = friction_pyramid(robot.friction_coefficient)[:4]
+        for i in np.flatnonzero(loaded):
+            rows.between(ca.DM(pyramid) @ s.force[i], 0.0, _NO_BOUND)  # (3.9b, c)
+        if self.variant is not Variant.KD:
+            self._actuator_rows(rows, s, loaded)
+
+        following = s.step(self.model, robot.mass)
+        kind = StageKind(
+            name=f"take_off_{len(self._kinds)}",
+            x=s.x,
+            u=s.u,
+            p=s.p,
+            cost=cost,
+            next_state=following,
+            constraints=rows.expression,
+            lower=rows.lower,
+            upper=rows.upper,
+        )
+        self._kinds[key] = kind
+        return kind
+
+    def _actuator_rows(self, rows: _Rows, s: _TakeOffSymbols, loaded: tuple[bool, ...]) -> None:
+        """Add torque and voltage limits (3.11b, c) of the joints that carry loaded contacts, with τ of (3.14)."""
+        robot, law = self.robot, self.robot.actuators
+        q_j = s.q_j
+        if self.variant is Variant.AAKD_STAR:
+            frozen = ca.DM(robot.frozen_joints.astype(float))
+            q_j = frozen * s.q_j_frozen + (1 - frozen) * s.q_j
+        J = self.model.foot_jacobians(q_j)  # (3 n_c, n) in B
+        torque = ca.SX(robot.n_joints, 1)
+        for i in np.flatnonzero(loaded):
+            torque -= J[3 * i : 3 * i + 3, :].T @ (s.R.T @ s.force[i])  # (3.14)
+        share = self.settings.margin
+        for joint in range(robot.n_joints):
+            if torque[joint].is_zero():
+                continue
+            rows.between(torque[joint] / law.torque_max[joint], -share, share)  # (3.11b)
+            volts = law.volts_per_torque[joint] * torque[joint] + law.volts_per_speed[joint] * s.dq_j[joint]
+            rows.between(volts / law.bus_voltage[joint], -share, share)  # (3.11c)
+
+    def _lift_off_kind(self, touching: tuple[bool, ...]) -> StageKind:
+        """Return the knot at which the last contact ends: the ballistic path from here ends at the goal."""
+        key = ("lift_off", touching)
+        if key in self._kinds:
+            return self._kinds[key]
+        robot = self.robot
+        s = _TakeOffSymbols(robot, self.model, (False,) * robot.n_contacts, in_flight=True)
+        rows = _Rows()
+        feet = _world_feet(self.model, s)
+        for i in np.flatnonzero(touching):
+            rows.equal(feet[:, i] - s.foot_ref[:, i])
+        landing = s.r + s.flight_time * s.rdot - ca.vertcat(0, 0, 0.5 * GRAVITY * s.flight_time**2)
+        lead = s.landing_lead * ca.vertcat(s.rdot[:2], 0)
+        rows.equal(landing + lead - s.landing_com)
+        flight = _FlightSymbols(robot, s.alpha, s.quaternion, s.q_j, s.omega, s.flight_p)
+        rows.equal(flight.momentum_gap(self.model))
+        kind = StageKind(
+            name="lift_off",
+            x=s.x,
+            u=s.u,
+            p=s.p,
+            cost=self.settings.weights.angular_velocity * ca.sumsqr(s.omega),
+            next_state=flight.step(),
+            constraints=rows.expression,
+            lower=rows.lower,
+            upper=rows.upper,
+        )
+        self._kinds[key] = kind
+        return kind
+
+    def _flight_kind(self) -> StageKind:
+        key = ("flight",)
+        if key not in self._kinds:
+            robot = self.robot
+            alpha, quaternion, q_j = ca.SX.sym("alpha", 3), ca.SX.sym("quat", 4), ca.SX.sym("q_j", robot.n_joints)
+            omega, p = ca.SX.sym("omega", 3), ca.SX.sym("p", _FlightSymbols.n_p(robot))
+            flight = _FlightSymbols(robot, alpha, quaternion, q_j, omega, p)
+            rows = _Rows()
+            rows.equal(flight.momentum_gap(self.model))
+            self._kinds[key] = StageKind(
+                name="flight",
+                x=ca.vertcat(alpha, quaternion, q_j),
+                u=omega,
+                p=p,
+                cost=self.settings.weights.angular_velocity * ca.sumsqr(omega),
+                next_state=flight.step(),
+                constraints=rows.expression,
+                lower=rows.lower,
+                upper=rows.upper,
+            )
+        return self._kinds[key]
+
+    def _touchdown_kind(self) -> StageKind:
+        key = ("touchdown",)
+        if key not in self._kinds:
+            x = ca.SX.sym("x", 7 + self.robot.n_joints)
+            goal = ca.SX.sym("goal", 4)
+            error = quaternion_product(conjugate(goal), x[3:7])
+            rows = _Rows()
+            rows.equal(error[:3])
+            rows.between(error[3], _HALF_TURN_MARGIN, _NO_BOUND)
+            self._kinds[key] = StageKind(
+                name="touchdown",
+                x=x,
+                u=ca.SX(0, 1),
+                p=goal,
+                cost=ca.SX(0),
+                next_state=None,
+                constraints=rows.expression,
+                lower=rows.lower,
+                upper=rows.upper,
+            )
+        return self._kinds[key]
+
+    # --- numbers of one request -------------------------------------------------------------------------------------
+
+    def _stages(self, schedule: Schedule, reference: Reference, guess: TakeOffTrajectory) -> list[StageData]:
+        robot, settings = self.robot, self.settings
+        n = robot.n_joints
+        N = len(schedule.contact)
+        free = np.full(3, _NO_BOUND)
+        low, high = robot.planning_range
+        x_max = np.concatenate([free, free, free, np.full(4, _NO_BOUND), high])
+        x_min = np.concatenate([-free, -free, -free, np.full(4, -_NO_BOUND), low])
+        unbounded = np.full_like(x_max, _NO_BOUND)
+        speed = settings.speed_margin * robot.actuators.no_load_speed  # (3.11a)
+        if self.variant is Variant.KD:
+            speed = np.full(n, _NO_BOUND)
+        x = np.hstack([guess.com, guess.com_velocity, guess.angular_momentum, guess.orientation, guess.joint_position])
+        foot_ref = reference.foot_position.ravel()
+        path = reference.flight_path
+        stages = []
+        for k in range(N):
+            loaded = schedule.contact[k]
+            n_f = 3 * int(loaded.sum())
+            force_low = np.tile([-_NO_BOUND, -_NO_BOUND, settings.force_min], n_f // 3)
+            force_high = np.tile([_NO_BOUND, _NO_BOUND, settings.force_max], n_f // 3)
+            p = np.concatenate(
+                [
+                    [schedule.dt],
+                    reference.com[k],
+                    reference.com_velocity[k],
+                    reference.orientation[k],
+                    reference.joint_position[k],
+                    reference.x_0[-n:],
+                    foot_ref,
+                    reference.x_0,
+                ]
+            )
+            u = np.concatenate([guess.angular_velocity[k], guess.joint_velocity[k], guess.force[k][loaded].ravel()])
+            stages.append(
+                StageData(
+                    p=p,
+                    x_min=-unbounded if k == 0 else x_min,
+                    x_max=unbounded if k == 0 else x_max,
+                    u_min=np.concatenate([-free, -speed, force_low]),
+                    u_max=np.concatenate([free, speed, force_high]),
+                    x=x[k],
+                    u=u,
+                )
+            )
+        lift_off_p = np.concatenate(
+            [
+                foot_ref,
+                [schedule.flight_time, settings.landing_lead],
+                reference.landing_com,
+                path.parameters(0),
+            ]
+        )
+        stages.append(
+            StageData(
+                p=lift_off_p, x_min=x_min, x_max=x_max, u_min=-free, u_max=free, x=x[N], u=guess.flight_angular_velocity[0]
+            )
+        )
+        alpha = guess.angular_momentum[-1]
+        for k in range(1, schedule.flight_knots + 1):
+            last = k == schedule.flight_knots
+            x_k = np.concatenate([alpha, guess.flight_orientation[k], guess.flight_joint_position[k]])
+            bound = np.full(len(x_k), _NO_BOUND)
+            stages.append(
+                StageData(
+                    p=schedule.landing_orientation if last else path.parameters(k),
+                    x_min=-bound,
+                    x_max=bound,
+                    u_min=-free[: 0 if last else 3],
+                    u_max=free[: 0 if last else 3],
+                    x=x_k,
+                    u=np.zeros(0) if last else guess.flight_angular_velocity[k],
+                )
+            )
+        return stages
+
+    def _trajectory(self, schedule: Schedule, solution: Solution) -> TakeOffTrajectory:
+        n = self.robot.n_joints
+        N = len(schedule.contact)
+        x = np.array(solution.x[: N + 1])
+        force = np.zeros((N, self.robot.n_contacts, 3))
+        for k in range(N):
+            force[k][schedule.contact[k]] = solution.u[k][3 + n :].reshape(-1, 3)
+        flight = np.array([x[N][6:], *solution.x[N + 1 :]])
+        return TakeOffTrajectory(
+            com=x[:, :3],
+            com_velocity=x[:, 3:6],
+            angular_momentum=x[:, 6:9],
+            orientation=x[:, 9:13],
+            joint_position=x[:, 13:],
+            angular_velocity=np.array([u[:3] for u in solution.u[:N]]),
+            joint_velocity=np.array([u[3 : 3 + n] for u in solution.u[:N]]),
+            force=force,
+            flight_orientation=flight[:, 3:7],
+            flight_joint_position=flight[:, 7:],
+            flight_angular_velocity=np.array([u[:3] for u in solution.u[N : N + schedule.flight_knots]]),
+        )
+
+
+class _Rows:
+    """Constraint rows with their bounds."""
+
+    def __init__(self) -> None:
+        self._expressions: list[ca.SX] = []
+        self._lower: list[float] = []
+        self._upper: list[float] = []
+
+    def equal(self, expression: ca.SX) -> None:
+        """Add expression = 0."""
+        self.between(expression, 0.0, 0.0)
+
+    def between(self, expression: ca.SX, lower: float, upper: float) -> None:
+        """Add lower ≤ expression ≤ upper."""
+        self._expressions.append(expression)
+        self._lower += [lower] * expression.numel()
+        self._upper += [upper] * expression.numel()
+
+    @property
+    def expression(self) -> ca.SX:
+        return ca.vertcat(*self._expressions)
+
+    @property
+    def lower(self) -> np.ndarray:
+        return np.array(self._lower)
+
+    @property
+    def upper(self) -> np.ndarray:
+        return np.array(self._upper)
+
+
+class _TakeOffSymbols:
+    """Symbols of a take-off knot and its Euler step (3.5, 3.6)."""
+
+    def __init__(
+        self, robot: Robot, model: BaseFrameModel, loaded: Sequence[bool], *, in_flight: bool = False
+    ) -> None:
+        n, n_c = robot.n_joints, robot.n_contacts
+        self._model = model
+        self.r, self.rdot, self.alpha = (ca.SX.sym(name, 3) for name in ("r", "rdot", "alpha"))
+        self.quaternion, self.q_j = ca.SX.sym("quat", 4), ca.SX.sym("q_j", n)
+        self.omega, self.dq_j = ca.SX.sym("omega", 3), ca.SX.sym("dq_j", n)
+        self.force = {int(i): ca.SX.sym(f"f_{i}", 3) for i in np.flatnonzero(loaded)}
+        self.f = ca.vertcat(*self.force.values())
+        self.x = ca.vertcat(self.r, self.rdot, self.alpha, self.quaternion, self.q_j)
+        self.foot_ref = ca.SX.sym("foot_ref", 3, n_c)
+        if in_flight:
+            self.u = self.omega
+            self.flight_time, self.landing_lead = ca.SX.sym("T"), ca.SX.sym("lead")
+            self.landing_com = ca.SX.sym("landing_com", 3)
+            self.flight_p = ca.SX.sym("flight_p", _FlightSymbols.n_p(robot))
+            self.p = ca.vertcat(
+                ca.vec(self.foot_ref), self.flight_time, self.landing_lead, self.landing_com, self.flight_p
+            )
+            return
+        self.u = ca.vertcat(self.omega, self.dq_j, self.f)
+        self.dt = ca.SX.sym("dt")
+        self.r_ref, self.rdot_ref = ca.SX.sym("r_ref", 3), ca.SX.sym("rdot_ref", 3)
+        self.quaternion_ref, self.q_j_ref = ca.SX.sym("quat_ref", 4), ca.SX.sym("q_j_ref", n)
+        self.q_j_frozen = ca.SX.sym("q_j_frozen", n)
+        self.x_0 = ca.SX.sym("x_0", self.x.numel())
+        self.p = ca.vertcat(
+            self.dt,
+            self.r_ref,
+            self.rdot_ref,
+            self.quaternion_ref,
+            self.q_j_ref,
+            self.q_j_frozen,
+            ca.vec(self.foot_ref),
+            self.x_0,
+        )
+
+    @property
+    def R(self) -> ca.SX:  # noqa: N802
+        return rotation_matrix(self.quaternion)
+
+    def step(self, model: BaseFrameModel, mass: float) -> ca.SX:
+        """Return the next state: (3.5) and (3.6)."""
+        feet = _world_feet(model, self)
+        rddot = -ca.vertcat(0, 0, GRAVITY)
+        alpha_dot = ca.SX.zeros(3)
+        for i, f in self.force.items():
+            rddot += f / mass
+            alpha_dot += ca.cross(feet[:, i] - self.r, f)
+        rdot_next = self.rdot + rddot * self.dt
+        return ca.vertcat(
+            self.r + 0.5 * (self.rdot + rdot_next) * self.dt,
+            rdot_next,
+            self.alpha + alpha_dot * self.dt,
+            quaternion_product(self.quaternion, quaternion_step(self.omega, self.dt)),
+            self.q_j + self.dq_j * self.dt,
+        )
+
+
+class _FlightSymbols:
+    """A flight interval: α constant, legs on their path, the body turning so that (3.8) holds at mid-interval."""
+
+    def __init__(self, robot: Robot, alpha: ca.SX, quaternion: ca.SX, q_j: ca.SX, omega: ca.SX, p: ca.SX) -> None:
+        self.alpha, self.quaternion, self.q_j, self.omega = alpha, quaternion, q_j, omega
+        self.dt, self.fraction, self.target = p[0], p[1], p[2:]
+        self.step_j = self.fraction * (self.target - q_j)
+
+    @staticmethod
+    def n_p(robot: Robot) -> int:
+        """Number of parameters: dt, fraction of the way to the target pose, the target pose."""
+        return 2 + robot.n_joints
+
+    def momentum_gap(self, model: BaseFrameModel) -> ca.SX:
+        """Return Rᵀα − α_B at mid-interval (3.8)."""
+        R_mid = rotation_matrix(quaternion_product(self.quaternion, quaternion_step(self.omega, 0.5 * self.dt)))
+        return R_mid.T @ self.alpha - model.angular_momentum(
+            self.q_j + 0.5 * self.step_j, self.omega, self.step_j / self.dt
+        )
+
+    def step(self) -> ca.SX:
+        """Return α, attitude and joint angles at the end of the interval."""
+        return ca.vertcat(
+            self.alpha,
+            quaternion_product(self.quaternion, quaternion_step(self.omega, self.dt)),
+            self.q_j + self.step_j,
+        )
+
+
+def _world_feet(model: BaseFrameModel, s: _TakeOffSymbols) -> ca.SX:
+    """Return c_i ``(3, n_c)`` [m] in S from the centre of mass and the attitude (3.7)."""
+    relative = model.feet(s.q_j) - ca.repmat(model.com(s.q_j), 1, s.foot_ref.shape[1])
+    return ca.repmat(s.r, 1, s.foot_ref.shape[1]) + s.R @ relative
+
+
+def _attitude_error(quaternion: ca.SX, reference: ca.SX) -> ca.SX:
+    """Return twice the vector part of q_ref* ⊗ q: the rotation vector of small errors ``(3,)`` [rad]."""
+    return 2 * quaternion_product(conjugate(reference), quaternion)[:3]
+
+
+def _contact_sets(schedule: Schedule) -> list[tuple[tuple[bool, ...] | None, tuple[bool, ...]]]:
+    """Return for each take-off knot the contacts held since the knot before (None at the first) and those loaded."""
+    rows = [tuple(bool(b) for b in row) for row in schedule.contact]
+    return [(None if k == 0 else rows[k - 1], rows[k]) for k in range(len(rows))]

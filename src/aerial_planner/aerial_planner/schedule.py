@@ -1,0 +1,136 @@
+"""From a request to its contact schedule: which contact point carries load when, how long the flight is, where it ends.
+
+A motion is data: one YAML file in ``motions/``; no motion has code of its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+
+from aerial_model import rotation
+from aerial_model.config import closest, from_mapping, load_yaml
+from aerial_model.errors import ConfigurationError, RefusalCode, RefusalError
+from aerial_model.request import MotionRequest
+from aerial_model.robot import Robot
+
+GRAVITY = 9.81  # [m/s²]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlightRule:
+    """How high a motion flies; see the YAML of ``jump``."""
+
+    clearance: float  # of the centre of mass above its landing height at apex [m]
+    clearance_per_distance: float = 0.0  # [m/m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """One motion as its YAML file says."""
+
+    summary: str
+    take_off: tuple  # of mappings with `contacts` (all, or names) and `duration` [s]
+    flight: FlightRule
+    goal: tuple  # of names of the request's numbers that may be set
+
+
+@dataclass(frozen=True, kw_only=True)
+class Schedule:
+    """The discrete skeleton of one plan."""
+
+    dt: float  # of the take-off knots [s]
+    contact: np.ndarray  # (N, n_c) bool: contact on [t_k, t_k+1), all of the take-off
+    flight_time: float  # [s]
+    flight_knots: int  # intervals the flight is integrated with
+    landing_centre: np.ndarray  # (3,) of the support at landing, in S, z: the surface [m]
+    landing_yaw: float  # in S [rad]
+
+    @property
+    def take_off_time(self) -> float:
+        """When the last contact ends [s]."""
+        return self.dt * len(self.contact)
+
+    @property
+    def landing_orientation(self) -> np.ndarray:
+        """Attitude ``(4,)`` at touchdown: level, at the landing heading."""
+        return rotation.about_z(self.landing_yaw)
+
+
+def motions_folder() -> Path:
+    """Return the folder whose YAML files are the known motions."""
+    return Path(str(resources.files("aerial_planner"))) / "motions"
+
+
+def known_motions() -> dict[str, Path]:
+    """Return the known motions: name → file."""
+    return {path.stem: path for path in sorted(motions_folder().glob("*.yaml"))}
+
+
+def load_motion(name: str) -> Motion:
+    """Return a motion by name.
+
+    Raises:
+        RefusalError: if there is none of that name, with the names that exist.
+    """
+    known = known_motions()
+    if name not in known:
+        raise RefusalError(
+            RefusalCode.UNKNOWN_MOTION, f"unknown motion '{name}'{closest(name, known)}; known: {', '.join(known)}"
+        )
+    return from_mapping(Motion, load_yaml(known[name]), str(known[name]))
+
+
+def flight_time(rise: float, height: float) -> float:
+    """Return the time [s] of a ballistic flight that rises ``rise`` [m] and ends ``height`` [m] above its start."""
+    return float(np.sqrt(2 * rise / GRAVITY) + np.sqrt(2 * (rise - height) / GRAVITY))
+
+
+def contact_schedule(request: MotionRequest, motion: Motion, robot: Robot, dt: float, flight_knots: int) -> Schedule:
+    """Return the schedule of a request.
+
+    Raises:
+        RefusalError: if the request sets something the motion does not have.
+    """
+    _check_goal(request, motion)
+    rows = []
+    names = [point.name for point in robot.contact_points]
+    for phase in motion.take_off:
+        mask = _contacts(phase["contacts"], names)
+        rows += [mask] * max(1, round(float(phase["duration"]) / dt))
+    distance = float(np.linalg.norm(request.displacement[:2]))
+    height = float(request.displacement[2])
+    rise = max(height, 0.0) + motion.flight.clearance + motion.flight.clearance_per_distance * distance
+    return Schedule(
+        dt=dt,
+        contact=np.array(rows),
+        flight_time=flight_time(rise, height),
+        flight_knots=flight_knots,
+        landing_centre=np.array(request.displacement),
+        landing_yaw=request.yaw,
+    )
+
+
+def _check_goal(request: MotionRequest, motion: Motion) -> None:
+    asked = {
+        "displacement": bool(np.any(request.displacement)),
+        "yaw": request.yaw != 0.0,
+        "rotation": request.rotation is not None,
+    }
+    for name, is_set in asked.items():
+        if is_set and name not in motion.goal:
+            raise RefusalError(
+                RefusalCode.INVALID_REQUEST,
+                f"motion '{request.motion}' has no {name} to set; it has: {', '.join(motion.goal) or 'none'}",
+            )
+
+
+def _contacts(entry: object, names: list[str]) -> np.ndarray:
+    if entry == "all":
+        return np.ones(len(names), dtype=bool)
+    if not isinstance(entry, list) or any(name not in names for name in entry):
+        raise ConfigurationError(f"contacts of a take-off phase: expected 'all' or some of {names}, found {entry!r}")
+    return np.array([name in entry for name in names])

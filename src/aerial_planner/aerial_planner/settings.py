@@ -1,0 +1,37 @@
+"""The planner's numbers: one set of weights and margins for all motions of a robot (``planner`` in ``robot.yaml``)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True, kw_only=True)
+class Weights:
+    """Q of the cost (3.4), per knot; errors in SI units."""
+
+    orientation: float = 2.0  # [1/rad²]
+    joint_position: float = 0.05  # [1/rad²]
+    angular_velocity: float = 0.01  # [s²/rad²]
+    joint_velocity: float = 1e-3  # [s²/rad²]
+    com: float = 5.0  # [1/m²]
+    com_velocity: float = 0.1  # [s²/m²]
+    force: float = 1e-4  # [1/N²]
+
+    def __post_init__(self) -> None:
+        if any(value < 0 for value in vars(self).values()):
+            raise ValueError("weights must not be negative")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlannerSettings:
+    """Discretization, margins and weights."""
+
+    dt: float = 0.01  # of the take-off knots, as in the thesis [s]
+    flight_knots: int = 16  # intervals of the flight
+    margin: float = 0.85  # share of torque and voltage limits a plan may use: −Jᵀf leaves leg inertia and losses out
+    speed_margin: float = 0.9  # share of the no-load speed a plan may use
+    force_max: float = 300.0  # greatest normal force of one contact [N]
+    force_min: float = 0.0  # least normal force of one loaded contact [N]
+    reach: float = 0.97  # β of (3.18): share of the longest leg the single-rigid-body stage may use
+    landing_lead: float = 0.05  # time by which landing feet are set ahead of the centre of mass along its velocity [s]
+    weights: Weights = field(default_factory=Weights)

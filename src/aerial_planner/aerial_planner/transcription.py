@@ -1,0 +1,315 @@
+"""Multi-stage optimal control problems, written one stage at a time and solved by FATROP or IPOPT.
+
+A *stage kind* holds the CasADi expressions of one knot: next state, cost, constraints. A *problem* is a sequence of
+stage kinds. Derivatives (exact Hessian included) are made once per kind and mapped over the knots of that kind, so that
+building a problem costs as much as differentiating a handful of knots, and a built problem serves every request of the
+same sequence: all numbers enter as stage parameters and bounds.
+
+    min  Σ_k cost_k(x_k, u_k, p_k)
+    s.t. x_k+1 = next_k(x_k, u_k, p_k),   lower_k ≤ constraint_k(x_k, u_k, p_k) ≤ upper_k ,  bounds on x_k, u_k .
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StageKind:
+    """The expressions of one kind of knot; ``next_state`` is None at the last one.
+
+    Constraint bounds that are numbers of the problem rather than of the request are given here.
+    """
+
+    name: str
+    x: ca.SX  # (n_x,)
+    u: ca.SX  # (n_u,), possibly empty
+    p: ca.SX  # (n_p,) stage parameters
+    cost: ca.SX  # scalar
+    next_state: ca.SX | None
+    constraints: ca.SX  # (n_g,)
+    lower: np.ndarray  # (n_g,); equal to upper: an equality
+    upper: np.ndarray  # (n_g,)
+
+    @property
+    def n_next(self) -> int:
+        """Number of states of the next knot."""
+        return 0 if self.next_state is None else self.next_state.numel()
+
+    @cached_property
+    def _dynamics(self) -> ca.SX:
+        return ca.SX(0, 1) if self.next_state is None else self.next_state
+
+    @property
+    def z(self) -> ca.SX:
+        """States and controls ``(n_x + n_u,)``."""
+        return ca.vertcat(self.x, self.u)
+
+    @cached_property
+    def values(self) -> ca.Function:
+        """(z, p) ↦ cost, next state, constraints."""
+        return ca.Function(
+            self.name, [self.z, self.p], [self.cost, self._dynamics, ca.densify(self.constraints)], {"cse": True}
+        )
+
+    @cached_property
+    def gradient(self) -> ca.Function:
+        """(z, p) ↦ gradient of the cost."""
+        return ca.Function(self.name + "_grad", [self.z, self.p], [ca.densify(ca.gradient(self.cost, self.z))], {"cse": True})
+
+    @cached_property
+    def jacobian(self) -> ca.Function:
+        """(z, p) ↦ Jacobians of −next state and of the constraints with respect to z."""
+        J = [ca.jacobian(-self._dynamics, self.z), ca.jacobian(self.constraints, self.z)]
+        return ca.Function(self.name + "_jac", [self.z, self.p], J, {"cse": True})
+
+    @cached_property
+    def hessian(self) -> ca.Function:
+        """(z, p, λ_f, λ_dynamics, λ_constraints) ↦ gradient and Hessian of the Lagrangian with respect to z."""
+        lam_f = ca.SX.sym("lam_f")
+        lam_x = ca.SX.sym("lam_x", self.n_next)
+        lam_g = ca.SX.sym("lam_g", self.constraints.numel())
+        lagrangian = lam_f * self.cost - ca.dot(lam_x, self._dynamics) + ca.dot(lam_g, self.constraints)
+        H, g = ca.hessian(lagrangian, self.z)
+        return ca.Function(
+            self.name + "_hess", [self.z, self.p, lam_f, lam_x, lam_g], [ca.densify(g), H], {"cse": True}
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class StageData:
+    """The numbers of one knot of one request."""
+
+    p: np.ndarray  # (n_p,)
+    x_min: np.ndarray  # (n_x,)
+    x_max: np.ndarray
+    u_min: np.ndarray  # (n_u,)
+    u_max: np.ndarray
+    x: np.ndarray  # guess (n_x,)
+    u: np.ndarray  # guess (n_u,)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Solution:
+    """What a solver returned, knot by knot."""
+
+    x: list[np.ndarray]
+    u: list[np.ndarray]
+    cost: float
+    iterations: int
+    status: str
+    converged: bool
+    max_violation: float  # of any constraint or bound
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolverOptions:
+    """How to solve; the defaults suit a good first guess."""
+
+    solver: str = "fatrop"  # or "ipopt" (with MUMPS)
+    tolerance: float = 1e-4  # on optimality and constraints
+    max_iterations: int = 100
+    initial_barrier: float = 1e-2  # μ_0 of the interior-point method
+
+
+class Problem:
+    """A sequence of stage kinds, built once and solved for many requests."""
+
+    def __init__(self, kinds: Sequence[StageKind], options: SolverOptions = SolverOptions()) -> None:
+        self.kinds = list(kinds)
+        self.options = options
+        self._layout = _Layout(self.kinds)
+        self._solver = self._build()
+
+    def solve(self, stages: Sequence[StageData]) -> Solution:
+        """Return the optimum from the stages' guess; check ``converged`` and ``max_violation`` before using it."""
+        w_0 = np.concatenate([np.concatenate([s.x, s.u]) for s in stages])
+        lower_w = np.concatenate([np.concatenate([s.x_min, s.u_min]) for s in stages])
+        upper_w = np.concatenate([np.concatenate([s.x_max, s.u_max]) for s in stages])
+        p = np.concatenate([s.p for s in stages])
+        lower_g, upper_g = self._layout.lower, self._layout.upper
+        result = self._solver(x0=w_0, p=p, lbx=lower_w, ubx=upper_w, lbg=lower_g, ubg=upper_g)
+        stats = self._solver.stats()
+        w, g = np.asarray(result["x"]).ravel(), np.asarray(result["g"]).ravel()
+        with np.errstate(invalid="ignore"):
+            excess = np.concatenate([lower_w - w, w - upper_w, lower_g - g, g - upper_g])
+        finite = np.all(np.isfinite(w))
+        x, u = self._layout.split(w)
+        return Solution(
+            x=x,
+            u=u,
+            cost=float(result["f"]),
+            iterations=int(stats.get("iter_count", 0)),
+            status=str(stats.get("return_status", stats.get("unified_return_status", ""))),
+            converged=bool(stats["success"]) and finite,
+            max_violation=float(np.max(excess, initial=0.0)) if finite else float("inf"),
+        )
+
+    def _build(self) -> ca.Function:
+        layout = self._layout
+        functions = layout.functions(self.options.solver)
+        w, p = layout.w, layout.p
+        nlp = {"x": w, "p": p, "f": functions["nlp_f"](w, p), "g": functions["nlp_g"](w, p)}
+        common = {"print_time": False, "cache": functions, "error_on_fail": False}
+        options = self.options
+        if options.solver == "fatrop":
+            settings = {
+                "structure_detection": "manual",
+                "N": len(self.kinds) - 1,
+                "nx": layout.nx,
+                "nu": layout.nu,
+                "ng": layout.ng,
+                "equality": layout.equality.tolist(),
+                "fatrop": {
+                    "print_level": 0,
+                    "tol": options.tolerance,
+                    "max_iter": options.max_iterations,
+                    "mu_init": options.initial_barrier,
+                },
+            }
+        else:
+            settings = {
+                "ipopt": {
+                    "print_level": 0,
+                    "sb": "yes",
+                    "tol": options.tolerance,
+                    "max_iter": options.max_iterations,
+                    "mu_init": options.initial_barrier,
+                    "linear_solver": "mumps",
+                }
+            }
+        return ca.nlpsol("kino_dynamic", options.solver, nlp, {**common, **settings})
+
+
+@dataclass
+class _Layout:
+    """Where each knot's variables, parameters and constraints stand in the flat problem FATROP reads.
+
+    Variables: x_0, u_0, x_1, u_1, …; constraints: dynamics 0 (x_1 − next_0), constraints 0, dynamics 1, ….
+    """
+
+    kinds: list[StageKind]
+    nx: list[int] = field(init=False)
+    nu: list[int] = field(init=False)
+    ng: list[int] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.nx = [kind.x.numel() for kind in self.kinds]
+        self.nu = [kind.u.numel() for kind in self.kinds]
+        self.ng = [kind.constraints.numel() for kind in self.kinds]
+        for kind, following in zip(self.kinds[:-1], self.kinds[1:], strict=True):
+            if kind.n_next != following.x.numel():
+                raise ValueError(f"stage {kind.name} leads to {kind.n_next} states, {following.name} has {following.x.numel()}")
+        n_z = np.array([x + u for x, u in zip(self.nx, self.nu, strict=True)])
+        n_p = np.array([kind.p.numel() for kind in self.kinds])
+        n_rows = np.array([kind.n_next + ng for kind, ng in zip(self.kinds, self.ng, strict=True)])
+        self.z_0, self.p_0, self.row_0 = (np.concatenate([[0], np.cumsum(n)]) for n in (n_z, n_p, n_rows))
+        self.w = ca.MX.sym("w", int(self.z_0[-1]))
+        self.p = ca.MX.sym("p", int(self.p_0[-1]))
+        rows = [(np.zeros(kind.n_next), kind.lower, kind.upper) for kind in self.kinds]
+        self.lower = np.concatenate([np.concatenate([zero, low]) for zero, low, _ in rows])
+        self.upper = np.concatenate([np.concatenate([zero, up]) for zero, _, up in rows])
+        self.equality = self.lower == self.upper
+
+    def split(self, w: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Return the states and the controls of each knot."""
+        x = [w[start : start + n] for start, n in zip(self.z_0, self.nx, strict=False)]
+        u = [w[start + nx : start + nx + nu] for start, nx, nu in zip(self.z_0, self.nx, self.nu, strict=False)]
+        return x, u
+
+    def groups(self) -> list[tuple[StageKind, list[int]]]:
+        """Return each kind with the knots it stands at."""
+        found: dict[int, tuple[StageKind, list[int]]] = {}
+        for k, kind in enumerate(self.kinds):
+            found.setdefault(id(kind), (kind, []))[1].append(k)
+        return list(found.values())
+
+    def functions(self, solver: str) -> dict[str, ca.Function]:
+        """Return the problem's functions with the names and outputs that CasADi's interface to ``solver`` looks for."""
+        w, p = self.w, self.p
+        n_w, n_g = w.numel(), len(self.lower)
+        lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", n_g)
+        cost = ca.MX(0)
+        g, gradient, jacobian, lagrangian_gradient, hessian = ([] for _ in range(5))  # lists of _Blocks
+        for kind, knots in self.groups():
+            n = len(knots)
+            z_0, row_0 = self.z_0[knots], self.row_0[knots]
+            row_g = row_0 + kind.n_next
+            z, parameters = _gather(w, z_0, kind.z.numel()), _gather(p, self.p_0[knots], kind.p.numel())
+            lam = (_gather(lam_g, row_0, kind.n_next), _gather(lam_g, row_g, kind.constraints.numel()))
+            f, following, values = kind.values.map(n)(z, parameters)
+            J_x, J_g = kind.jacobian.map(n)(z, parameters)
+            lag, H = kind.hessian.map(n)(z, parameters, ca.repmat(lam_f, 1, n), *lam)
+            column = np.zeros(n, dtype=int)
+            cost += ca.sum2(f)
+            g += [_Blocks(kind.values.sparsity_out(1), -following, row_0, column)]
+            g += [_Blocks(kind.values.sparsity_out(2), values, row_g, column)]
+            gradient += [_Blocks(kind.gradient.sparsity_out(0), kind.gradient.map(n)(z, parameters), z_0, column)]
+            jacobian += [_Blocks(kind.jacobian.sparsity_out(0), J_x, row_0, z_0)]
+            jacobian += [_Blocks(kind.jacobian.sparsity_out(1), J_g, row_g, z_0)]
+            lagrangian_gradient += [_Blocks(kind.hessian.sparsity_out(0), lag, z_0, column)]
+            hessian += [_Blocks(kind.hessian.sparsity_out(1), H, z_0, z_0)]
+        for k, kind in enumerate(self.kinds[:-1]):  # the next knot's state, with coefficient 1
+            x_next = w[int(self.z_0[k + 1]) : int(self.z_0[k + 1]) + kind.n_next]
+            at_row, at_column = self.row_0[k : k + 1], self.z_0[k + 1 : k + 2]
+            g += [_Blocks(ca.Sparsity.dense(kind.n_next, 1), x_next, at_row, np.zeros(1, dtype=int))]
+            jacobian += [_Blocks(ca.Sparsity.diag(kind.n_next), ca.MX.ones(kind.n_next), at_row, at_column)]
+        g_all = _assembled(g, n_g, 1)
+        grad_f, H_all = _assembled(gradient, n_w, 1), _assembled(hessian, n_w, n_w)
+        outputs = {
+            "nlp_f": ([w, p], [cost], ["f"]),
+            "nlp_g": ([w, p], [g_all], ["g"]),
+            "nlp_jac_g": ([w, p], [g_all, _assembled(jacobian, n_g, n_w)], ["g", "jac_g_x"]),
+        }
+        multipliers = [w, p, lam_f, lam_g]
+        if solver == "fatrop":
+            grad_lagrangian = _assembled(lagrangian_gradient, n_w, 1)
+            outputs["nlp_grad_f"] = ([w, p], [grad_f], ["grad_f_x"])
+            outputs["nlp_hess_l"] = (multipliers, [grad_lagrangian, H_all], ["grad_gamma_x", "hess_gamma_x_x"])
+        else:
+            outputs["nlp_grad_f"] = ([w, p], [cost, grad_f], ["f", "grad_f_x"])
+            outputs["nlp_hess_l"] = (multipliers, [ca.triu(H_all)], ["triu_hess_gamma_x_x"])
+        inputs = ["x", "p", "lam_f", "lam_g"]
+        return {
+            name: ca.Function(name, arguments, results, inputs[: len(arguments)], result_names)
+            for name, (arguments, results, result_names) in outputs.items()
+        }
+
+
+@dataclass(frozen=True)
+class _Blocks:
+    """Equally shaped sparse blocks, side by side in ``values``, and where each one's corner stands in a matrix."""
+
+    sparsity: ca.Sparsity  # of one block
+    values: ca.MX
+    row_0: np.ndarray
+    column_0: np.ndarray
+
+
+def _gather(vector: ca.MX, starts: np.ndarray, n: int) -> ca.MX:
+    """Return ``(n, len(starts))``: the n entries from each start, as columns."""
+    indices = (np.asarray(starts)[:, None] + np.arange(n)).ravel().tolist()
+    return ca.reshape(vector[indices], n, len(starts))
+
+
+def _assembled(blocks: Sequence[_Blocks], n_rows: int, n_columns: int) -> ca.MX:
+    """Return the sparse matrix that holds all blocks; entries that several blocks share are added."""
+    rows, columns, values = [], [], []
+    for block in blocks:
+        rows.append((block.row_0[:, None] + np.array(block.sparsity.row(), dtype=int)).ravel())
+        columns.append((block.column_0[:, None] + np.array(block.sparsity.get_col(), dtype=int)).ravel())
+        values.append(ca.vec(block.values).nz[:])
+    rows, columns = np.concatenate(rows).astype(int), np.concatenate(columns).astype(int)
+    nonzeros = ca.vertcat(*values)
+    order = np.lexsort((rows, columns))
+    keys = columns[order] * n_rows + rows[order]
+    first = np.concatenate([[True], keys[1:] != keys[:-1]])
+    sparsity = ca.Sparsity.triplet(n_rows, n_columns, rows[order][first].tolist(), columns[order][first].tolist())
+    if np.all(first):
+        return ca.MX(sparsity, nonzeros[order.tolist()])
+    gather = ca.Sparsity.triplet(int(first.sum()), len(order), (np.cumsum(first) - 1).tolist(), order.tolist())
+    return ca.MX(sparsity, ca.mtimes(ca.DM(gather, 1), nonzeros))
