@@ -36,8 +36,13 @@ class Drive:
             command: set-points that hold for the period.
             position: joint positions ``(n,)`` [rad].
             speed: joint velocities ``(n,)`` [rad/s].
+
+        Raises:
+            ValueError: if the command does not amount to finite torques.
         """
         requested = command.requested_torque(position, speed)
+        if not np.isfinite(requested).all():
+            raise ValueError(f"a command must ask for finite torques, found {requested}")
         delivered = self._law.available(requested, speed)
         self._requested[step] = requested
         self._delivered[step] = delivered
