@@ -1,7 +1,5 @@
 """The actuator law as the simulated motors obey it."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 

@@ -3,7 +3,7 @@ import pytest
 
 from aerial_model import rotation
 from aerial_model.errors import ConfigurationError
-from aerial_sim.sensors import Sensors, SensorNoise
+from aerial_sim.sensors import SensorNoise, Sensors
 
 SAMPLES = 4000
 JOINTS = 12

@@ -26,11 +26,12 @@ from aerial_model.terrain import Terrain
 from aerial_sim.contacts import ContactSensing
 from aerial_sim.drive import Drive
 from aerial_sim.ground_truth import GroundTruth
-from aerial_sim.sensors import Sensors, SensorNoise
+from aerial_sim.sensors import SensorNoise, Sensors
 from aerial_sim.world import FRICTION_COEFFICIENT, World, build
 
 PHYSICS_DT = 0.0005  # [s]
 CONTROL_DT = 0.002  # [s]
+FLAT = Terrain()
 XYZW = [4, 5, 6, 3]  # the base quaternion in qpos, where MuJoCo has w first
 START_OFFSET = np.radians(1.0)  # largest error of the joints' starting positions with noise [rad]
 
@@ -54,7 +55,7 @@ class Simulation:
         self,
         robot: Robot,
         *,
-        terrain: Terrain = Terrain(),
+        terrain: Terrain = FLAT,
         noise: str = "nominal",
         seed: int = 0,
         physics_dt: float = PHYSICS_DT,
