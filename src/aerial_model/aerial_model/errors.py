@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from typing import Any
 
 
 class AerialError(Exception):
@@ -50,3 +51,4 @@ class RefusalError(AerialError):
         super().__init__(reason)
         self.code = code
         self.reason = reason
+        self.report: Any = None  # figures of the refused request, where the one who refuses has some

@@ -15,7 +15,6 @@ against them; because these knots are in the problem, the attitude at touchdown 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 
 import casadi as ca
@@ -28,15 +27,14 @@ from aerial_planner.schedule import GRAVITY, Schedule
 from aerial_planner.settings import PlannerSettings
 from aerial_planner.symbolic import (
     BaseFrameModel,
-    conjugate,
+    attitude_error,
     quaternion_product,
     quaternion_step,
     rotation_matrix,
 )
-from aerial_planner.transcription import Problem, Solution, SolverOptions, StageData, StageKind
+from aerial_planner.trajectory import TakeOffTrajectory
+from aerial_planner.transcription import Problem, Rows, Solution, SolverOptions, StageData, StageKind
 
-_NO_BOUND = np.inf
-_HALF_TURN_MARGIN = 0.5  # q_goal · q_land at least this: the attitude itself, not the one a full turn away
 
 
 class Variant(StrEnum):
@@ -45,23 +43,6 @@ class Variant(StrEnum):
     KD = "KD"  # none
     AAKD = "AAKD"  # (3.11) with the exact contact Jacobian
     AAKD_STAR = "AAKD*"  # (3.11) with the Jacobian at frozen ab/adduction
-
-
-@dataclass(frozen=True, kw_only=True)
-class TakeOffTrajectory:
-    """What an optimization stage returns: K = N + 1 take-off knots and M + 1 flight knots, in S."""
-
-    com: np.ndarray  # (N+1, 3)
-    com_velocity: np.ndarray  # (N+1, 3)
-    angular_momentum: np.ndarray  # (N+1, 3)
-    orientation: np.ndarray  # (N+1, 4)
-    joint_position: np.ndarray  # (N+1, n)
-    angular_velocity: np.ndarray  # (N, 3) in B
-    joint_velocity: np.ndarray  # (N, n)
-    force: np.ndarray  # (N, n_c, 3)
-    flight_orientation: np.ndarray  # (M+1, 4)
-    flight_joint_position: np.ndarray  # (M+1, n)
-    flight_angular_velocity: np.ndarray  # (M, 3) in B
 
 
 class KinoDynamic:
@@ -112,7 +93,7 @@ class KinoDynamic:
 
         dr = s.r - s.r_ref
         dv = s.rdot - s.rdot_ref
-        turn = _attitude_error(s.quaternion, s.quaternion_ref)
+        turn = attitude_error(s.quaternion, s.quaternion_ref)
         dq = s.q_j - s.q_j_ref
         w = settings.weights
         cost = (
@@ -125,7 +106,7 @@ class KinoDynamic:
             + w.force * ca.sumsqr(s.f)
         )
 
-        rows = _Rows()
+        rows = Rows()
         R = s.R
         if touching is None:
             rows.equal(s.x - s.x_0)
@@ -135,30 +116,20 @@ class KinoDynamic:
                 if touching[i]:
                     rows.equal(feet[:, i] - s.foot_ref[:, i])  # (3.9a)
                 elif not loaded[i]:
-                    rows.between(feet[2, i] - s.foot_ref[2, i], 0.0, _NO_BOUND)  # (3.10)
+                    rows.between(feet[2, i] - s.foot_ref[2, i], 0.0, np.inf)  # (3.10)
         rows.equal(R.T @ s.alpha - self.model.angular_momentum(s.q_j, s.omega, s.dq_j))  # (3.8)
         pyramid = friction_pyramid(robot.friction_coefficient)[:4]
         for i in np.flatnonzero(loaded):
-            rows.between(ca.DM(pyramid) @ s.force[i], 0.0, _NO_BOUND)  # (3.9b, c)
+            rows.between(ca.DM(pyramid) @ s.force[i], 0.0, np.inf)  # (3.9b, c)
         if self.variant is not Variant.KD:
             self._actuator_rows(rows, s, loaded)
 
         following = s.step(self.model, robot.mass)
-        kind = StageKind(
-            name=f"take_off_{len(self._kinds)}",
-            x=s.x,
-            u=s.u,
-            p=s.p,
-            cost=cost,
-            next_state=following,
-            constraints=rows.expression,
-            lower=rows.lower,
-            upper=rows.upper,
-        )
+        kind = rows.stage(f"take_off_{len(self._kinds)}", s.x, s.u, s.p, cost, following)
         self._kinds[key] = kind
         return kind
 
-    def _actuator_rows(self, rows: _Rows, s: _TakeOffSymbols, loaded: tuple[bool, ...]) -> None:
+    def _actuator_rows(self, rows: Rows, s: _TakeOffSymbols, loaded: tuple[bool, ...]) -> None:
         """Add torque and voltage limits (3.11b, c) of the joints that carry loaded contacts, with τ of (3.14)."""
         robot, law = self.robot, self.robot.actuators
         q_j = s.q_j
@@ -184,7 +155,7 @@ class KinoDynamic:
             return self._kinds[key]
         robot = self.robot
         s = _TakeOffSymbols(robot, self.model, (False,) * robot.n_contacts, in_flight=True)
-        rows = _Rows()
+        rows = Rows()
         feet = _world_feet(self.model, s)
         for i in np.flatnonzero(touching):
             rows.equal(feet[:, i] - s.foot_ref[:, i])
@@ -193,17 +164,7 @@ class KinoDynamic:
         rows.equal(landing + lead - s.landing_com)
         flight = _FlightSymbols(robot, s.alpha, s.quaternion, s.q_j, s.omega, s.flight_p)
         rows.equal(flight.momentum_gap(self.model))
-        kind = StageKind(
-            name="lift_off",
-            x=s.x,
-            u=s.u,
-            p=s.p,
-            cost=self.settings.weights.angular_velocity * ca.sumsqr(s.omega),
-            next_state=flight.step(),
-            constraints=rows.expression,
-            lower=rows.lower,
-            upper=rows.upper,
-        )
+        kind = rows.stage("lift_off", s.x, s.u, s.p, self.settings.weights.angular_velocity * ca.sumsqr(s.omega), flight.step())
         self._kinds[key] = kind
         return kind
 
@@ -214,19 +175,9 @@ class KinoDynamic:
             alpha, quaternion, q_j = ca.SX.sym("alpha", 3), ca.SX.sym("quat", 4), ca.SX.sym("q_j", robot.n_joints)
             omega, p = ca.SX.sym("omega", 3), ca.SX.sym("p", _FlightSymbols.n_p(robot))
             flight = _FlightSymbols(robot, alpha, quaternion, q_j, omega, p)
-            rows = _Rows()
+            rows = Rows()
             rows.equal(flight.momentum_gap(self.model))
-            self._kinds[key] = StageKind(
-                name="flight",
-                x=ca.vertcat(alpha, quaternion, q_j),
-                u=omega,
-                p=p,
-                cost=self.settings.weights.angular_velocity * ca.sumsqr(omega),
-                next_state=flight.step(),
-                constraints=rows.expression,
-                lower=rows.lower,
-                upper=rows.upper,
-            )
+            self._kinds[key] = rows.stage("flight", ca.vertcat(alpha, quaternion, q_j), omega, p, self.settings.weights.angular_velocity * ca.sumsqr(omega), flight.step())
         return self._kinds[key]
 
     def _touchdown_kind(self) -> StageKind:
@@ -234,99 +185,51 @@ class KinoDynamic:
         if key not in self._kinds:
             x = ca.SX.sym("x", 7 + self.robot.n_joints)
             goal = ca.SX.sym("goal", 4)
-            error = quaternion_product(conjugate(goal), x[3:7])
-            rows = _Rows()
-            rows.equal(error[:3])
-            rows.between(error[3], _HALF_TURN_MARGIN, _NO_BOUND)
-            self._kinds[key] = StageKind(
-                name="touchdown",
-                x=x,
-                u=ca.SX(0, 1),
-                p=goal,
-                cost=ca.SX(0),
-                next_state=None,
-                constraints=rows.expression,
-                lower=rows.lower,
-                upper=rows.upper,
-            )
+            rows = Rows()
+            rows.attitude(x[3:7], goal)
+            self._kinds[key] = rows.stage("touchdown", x, ca.SX(0, 1), goal, ca.SX(0), None)
         return self._kinds[key]
 
     # --- numbers of one request -------------------------------------------------------------------------------------
 
     def _stages(self, schedule: Schedule, reference: Reference, guess: TakeOffTrajectory) -> list[StageData]:
         robot, settings = self.robot, self.settings
-        n = robot.n_joints
-        N = len(schedule.contact)
-        free = np.full(3, _NO_BOUND)
+        n, N, M = robot.n_joints, len(schedule.contact), schedule.flight_knots
         low, high = robot.planning_range
-        x_max = np.concatenate([free, free, free, np.full(4, _NO_BOUND), high])
-        x_min = np.concatenate([-free, -free, -free, np.full(4, -_NO_BOUND), low])
-        unbounded = np.full_like(x_max, _NO_BOUND)
-        speed = settings.speed_margin * robot.actuators.no_load_speed  # (3.11a)
-        if self.variant is Variant.KD:
-            speed = np.full(n, _NO_BOUND)
+        in_range = {"x_min": np.concatenate([np.full(13, -np.inf), low]), "x_max": np.concatenate([np.full(13, np.inf), high])}
+        aware = self.variant is not Variant.KD
+        speed = settings.speed_margin * robot.actuators.no_load_speed if aware else np.full(n, np.inf)  # (3.11a)
         x = np.hstack([guess.com, guess.com_velocity, guess.angular_momentum, guess.orientation, guess.joint_position])
         foot_ref = reference.foot_position.ravel()
         path = reference.flight_path
         stages = []
         for k in range(N):
             loaded = schedule.contact[k]
-            n_f = 3 * int(loaded.sum())
-            force_low = np.tile([-_NO_BOUND, -_NO_BOUND, settings.force_min], n_f // 3)
-            force_high = np.tile([_NO_BOUND, _NO_BOUND, settings.force_max], n_f // 3)
-            p = np.concatenate(
-                [
-                    [schedule.dt],
-                    reference.com[k],
-                    reference.com_velocity[k],
-                    reference.orientation[k],
-                    reference.joint_position[k],
-                    reference.x_0[-n:],
-                    foot_ref,
-                    reference.x_0,
-                ]
-            )
-            u = np.concatenate([guess.angular_velocity[k], guess.joint_velocity[k], guess.force[k][loaded].ravel()])
+            n_f = int(loaded.sum())
+            p = [[schedule.dt], reference.com[k], reference.com_velocity[k], reference.orientation[k]]
+            p += [reference.joint_position[k], reference.x_0[-n:], foot_ref, reference.x_0]
+            u = [guess.angular_velocity[k], guess.joint_velocity[k], guess.force[k][loaded].ravel()]
+            force_min = np.tile([-np.inf, -np.inf, settings.force_min], n_f)
+            force_max = np.tile([np.inf, np.inf, settings.force_max], n_f)
             stages.append(
-                StageData(
-                    p=p,
-                    x_min=-unbounded if k == 0 else x_min,
-                    x_max=unbounded if k == 0 else x_max,
-                    u_min=np.concatenate([-free, -speed, force_low]),
-                    u_max=np.concatenate([free, speed, force_high]),
+                StageData.free(
+                    p=np.concatenate(p),
                     x=x[k],
-                    u=u,
+                    u=np.concatenate(u),
+                    u_min=np.concatenate([np.full(3, -np.inf), -speed, force_min]),
+                    u_max=np.concatenate([np.full(3, np.inf), speed, force_max]),
+                    **({} if k == 0 else in_range),  # where the robot stands is given
                 )
             )
-        lift_off_p = np.concatenate(
-            [
-                foot_ref,
-                [schedule.flight_time, settings.landing_lead],
-                reference.landing_com,
-                path.parameters(0),
-            ]
-        )
-        stages.append(
-            StageData(
-                p=lift_off_p, x_min=x_min, x_max=x_max, u_min=-free, u_max=free, x=x[N], u=guess.flight_angular_velocity[0]
-            )
-        )
-        alpha = guess.angular_momentum[-1]
-        for k in range(1, schedule.flight_knots + 1):
-            last = k == schedule.flight_knots
-            x_k = np.concatenate([alpha, guess.flight_orientation[k], guess.flight_joint_position[k]])
-            bound = np.full(len(x_k), _NO_BOUND)
-            stages.append(
-                StageData(
-                    p=schedule.landing_orientation if last else path.parameters(k),
-                    x_min=-bound,
-                    x_max=bound,
-                    u_min=-free[: 0 if last else 3],
-                    u_max=free[: 0 if last else 3],
-                    x=x_k,
-                    u=np.zeros(0) if last else guess.flight_angular_velocity[k],
-                )
-            )
+        p = [foot_ref, [schedule.flight_time, settings.landing_lead], reference.landing_com, path.parameters(0)]
+        stages.append(StageData.free(p=np.concatenate(p), x=x[N], u=guess.flight_angular_velocity[0], **in_range))
+        flight = np.hstack([guess.flight_orientation, guess.flight_joint_position])
+        for k in range(1, M + 1):
+            x_k = np.concatenate([guess.angular_momentum[-1], flight[k]])
+            if k < M:
+                stages.append(StageData.free(p=path.parameters(k), x=x_k, u=guess.flight_angular_velocity[k]))
+            else:
+                stages.append(StageData.free(p=schedule.landing_orientation, x=x_k))
         return stages
 
     def _trajectory(self, schedule: Schedule, solution: Solution) -> TakeOffTrajectory:
@@ -350,37 +253,6 @@ class KinoDynamic:
             flight_joint_position=flight[:, 7:],
             flight_angular_velocity=np.array([u[:3] for u in solution.u[N : N + schedule.flight_knots]]),
         )
-
-
-class _Rows:
-    """Constraint rows with their bounds."""
-
-    def __init__(self) -> None:
-        self._expressions: list[ca.SX] = []
-        self._lower: list[float] = []
-        self._upper: list[float] = []
-
-    def equal(self, expression: ca.SX) -> None:
-        """Add expression = 0."""
-        self.between(expression, 0.0, 0.0)
-
-    def between(self, expression: ca.SX, lower: float, upper: float) -> None:
-        """Add lower ≤ expression ≤ upper."""
-        self._expressions.append(expression)
-        self._lower += [lower] * expression.numel()
-        self._upper += [upper] * expression.numel()
-
-    @property
-    def expression(self) -> ca.SX:
-        return ca.vertcat(*self._expressions)
-
-    @property
-    def lower(self) -> np.ndarray:
-        return np.array(self._lower)
-
-    @property
-    def upper(self) -> np.ndarray:
-        return np.array(self._upper)
 
 
 class _TakeOffSymbols:
@@ -479,11 +351,6 @@ def _world_feet(model: BaseFrameModel, s: _TakeOffSymbols) -> ca.SX:
     """Return c_i ``(3, n_c)`` [m] in S from the centre of mass and the attitude (3.7)."""
     relative = model.feet(s.q_j) - ca.repmat(model.com(s.q_j), 1, s.foot_ref.shape[1])
     return ca.repmat(s.r, 1, s.foot_ref.shape[1]) + s.R @ relative
-
-
-def _attitude_error(quaternion: ca.SX, reference: ca.SX) -> ca.SX:
-    """Return twice the vector part of q_ref* ⊗ q: the rotation vector of small errors ``(3,)`` [rad]."""
-    return 2 * quaternion_product(conjugate(reference), quaternion)[:3]
 
 
 def _contact_sets(schedule: Schedule) -> list[tuple[tuple[bool, ...] | None, tuple[bool, ...]]]:

@@ -19,22 +19,27 @@ _READY_AT = 0.9  # share of the flight after which they are in the landing pose
 
 @dataclass(frozen=True, kw_only=True)
 class FlightPath:
-    """The legs' path through the flight: towards the tuck, then towards the landing pose, without a jerk at either."""
+    """The legs' path through the flight: a smooth step to the tuck, then one to the landing pose."""
 
-    dt: float  # [s]
-    fraction: np.ndarray  # (M,) share of the remaining way to the target covered in each interval
-    target: np.ndarray  # (M, n) pose each interval moves towards [rad]
+    dt: float  # of the M intervals [s]
+    turning: int  # knot at which the legs are tucked
+    ready: int  # knot at which they are in the landing pose
+    tuck: np.ndarray  # (n,) [rad]
+    landing: np.ndarray  # (n,) [rad]
+    fraction: np.ndarray  # (M,) share of the remaining way to the pose ahead covered in each interval
 
     def parameters(self, k: int) -> np.ndarray:
-        """Return dt, fraction and target of interval ``k`` as one vector."""
-        return np.concatenate([[self.dt, self.fraction[k]], self.target[k]])
+        """Return dt, fraction and pose ahead of interval ``k`` as one vector ``(2 + n,)``."""
+        return np.concatenate([[self.dt, self.fraction[k]], self.tuck if k < self.turning else self.landing])
 
-    def joint_positions(self, start: np.ndarray) -> np.ndarray:
-        """Return the path ``(M+1, n)`` [rad] from a take-off pose ``(n,)``."""
-        q = [start]
-        for fraction, target in zip(self.fraction, self.target, strict=True):
-            q.append(q[-1] + fraction * (target - q[-1]))
-        return np.array(q)
+    def at(self, start: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return joint positions [rad] and rates [rad/s] ``(K, n)`` at ``time`` ``(K,)`` [s] from a take-off pose."""
+        turning, ready = self.turning * self.dt, self.ready * self.dt
+        up, up_rate = _smooth_step(np.asarray(time)[:, None] / turning)
+        down, down_rate = _smooth_step((np.asarray(time)[:, None] - turning) / (ready - turning))
+        position = start + up * (self.tuck - start) + down * (self.landing - self.tuck)
+        rate = up_rate / turning * (self.tuck - start) + down_rate / (ready - turning) * (self.landing - self.tuck)
+        return position, rate
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +48,7 @@ class Reference:
 
     com: np.ndarray  # (N+1, 3) [m]
     com_velocity: np.ndarray  # (N+1, 3) [m/s]
+    angular_momentum: np.ndarray  # (N+1, 3) [kg·m²/s]
     orientation: np.ndarray  # (N+1, 4)
     joint_position: np.ndarray  # (N+1, n) [rad]
     foot_position: np.ndarray  # (n_c, 3) of the standing robot [m]
@@ -83,6 +89,7 @@ def body_reference(
     return Reference(
         com=com,
         com_velocity=com_velocity,
+        angular_momentum=np.zeros((N + 1, 3)),
         orientation=np.tile(quaternion, (N + 1, 1)),
         joint_position=np.tile(q_j, (N + 1, 1)),
         foot_position=feet,
@@ -116,15 +123,16 @@ def _flight_path(schedule: Schedule, tuck: np.ndarray, landing: np.ndarray) -> F
     M = schedule.flight_knots
     turning = max(1, round(_TUCKED_AT * M))
     ready = max(turning + 1, round(_READY_AT * M))
-    fraction, target = np.zeros(M), np.tile(landing, (M, 1))
-    fraction[:turning] = _smooth_fractions(turning)
-    target[:turning] = tuck
-    fraction[turning:ready] = _smooth_fractions(ready - turning)
-    return FlightPath(dt=schedule.flight_time / M, fraction=fraction, target=target)
+    fraction = np.zeros(M)
+    for first, last in ((0, turning), (turning, ready)):
+        way, _ = _smooth_step(np.linspace(0.0, 1.0, last - first + 1))
+        fraction[first:last] = np.diff(way) / (1 - way[:-1])
+    return FlightPath(
+        dt=schedule.flight_time / M, turning=turning, ready=ready, tuck=tuck, landing=landing, fraction=fraction
+    )
 
 
-def _smooth_fractions(intervals: int) -> np.ndarray:
-    """Return the share of the remaining way covered in each interval when the whole way is a smooth step."""
-    s = np.linspace(0.0, 1.0, intervals + 1)
-    way = s**2 * (3 - 2 * s)
-    return np.diff(way) / (1 - way[:-1])
+def _smooth_step(s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return 3s² − 2s³ and its derivative, s held to [0, 1]."""
+    s = np.clip(s, 0.0, 1.0)
+    return s**2 * (3 - 2 * s), 6 * s * (1 - s)

@@ -89,8 +89,10 @@ def flight_time(rise: float, height: float) -> float:
     return float(np.sqrt(2 * rise / GRAVITY) + np.sqrt(2 * (rise - height) / GRAVITY))
 
 
-def contact_schedule(request: MotionRequest, motion: Motion, robot: Robot, dt: float, flight_knots: int) -> Schedule:
-    """Return the schedule of a request.
+def contact_schedule(
+    request: MotionRequest, motion: Motion, robot: Robot, dt: float, flight_knots: int, extra_rise: float = 0.0
+) -> Schedule:
+    """Return the schedule of a request; ``extra_rise`` [m] makes the flight higher than the motion's own rule.
 
     Raises:
         RefusalError: if the request sets something the motion does not have.
@@ -103,7 +105,7 @@ def contact_schedule(request: MotionRequest, motion: Motion, robot: Robot, dt: f
         rows += [mask] * max(1, round(float(phase["duration"]) / dt))
     distance = float(np.linalg.norm(request.displacement[:2]))
     height = float(request.displacement[2])
-    rise = max(height, 0.0) + motion.flight.clearance + motion.flight.clearance_per_distance * distance
+    rise = extra_rise + max(height, 0.0) + motion.flight.clearance + motion.flight.clearance_per_distance * distance
     return Schedule(
         dt=dt,
         contact=np.array(rows),

@@ -124,6 +124,11 @@ def quaternion_step(omega: ca.SX, dt: ca.SX) -> ca.SX:
     return ca.vertcat(sinc * half, cosine)
 
 
+def attitude_error(quaternion: ca.SX, reference: ca.SX) -> ca.SX:
+    """Return twice the vector part of q_ref* ⊗ q: the rotation vector of small errors ``(3,)`` [rad]."""
+    return 2 * quaternion_product(conjugate(reference), quaternion)[:3]
+
+
 def _constant(array: np.ndarray) -> ca.DM:
     """Return a constant whose rounding noise is structural zero, so that it costs no operations."""
     return ca.sparsify(ca.DM(np.where(np.abs(array) < _ROUNDING, 0.0, array)))

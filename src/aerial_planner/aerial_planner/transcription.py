@@ -18,6 +18,10 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from aerial_planner.symbolic import conjugate, quaternion_product
+
+_SAME_TURN = 0.5  # least q_goal · q of an attitude that is the goal's
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StageKind:
     """The expressions of one kind of knot; ``next_state`` is None at the last one.
@@ -80,6 +84,45 @@ class StageKind:
         )
 
 
+class Rows:
+    """Constraint rows with their bounds, collected in the order the formulation states them."""
+
+    def __init__(self) -> None:
+        self._expressions: list[ca.SX] = []
+        self._lower: list[float] = []
+        self._upper: list[float] = []
+
+    def equal(self, expression: ca.SX) -> None:
+        """Add expression = 0."""
+        self.between(expression, 0.0, 0.0)
+
+    def between(self, expression: ca.SX, lower: float, upper: float) -> None:
+        """Add lower ≤ expression ≤ upper."""
+        self._expressions.append(expression)
+        self._lower += [lower] * expression.numel()
+        self._upper += [upper] * expression.numel()
+
+    def attitude(self, quaternion: ca.SX, goal: ca.SX) -> None:
+        """Add quaternion = goal, and not its negative: the attitude itself, not the one a full turn away."""
+        error = quaternion_product(conjugate(goal), quaternion)
+        self.equal(error[:3])
+        self.between(error[3], _SAME_TURN, np.inf)
+
+    def stage(self, name: str, x: ca.SX, u: ca.SX, p: ca.SX, cost: ca.SX, next_state: ca.SX | None) -> StageKind:
+        """Return the stage kind with these rows as its constraints."""
+        return StageKind(
+            name=name,
+            x=x,
+            u=u,
+            p=p,
+            cost=cost,
+            next_state=next_state,
+            constraints=ca.vertcat(ca.SX(0, 1), *self._expressions),
+            lower=np.array(self._lower),
+            upper=np.array(self._upper),
+        )
+
+
 @dataclass(frozen=True, kw_only=True)
 class StageData:
     """The numbers of one knot of one request."""
@@ -91,6 +134,28 @@ class StageData:
     u_max: np.ndarray
     x: np.ndarray  # guess (n_x,)
     u: np.ndarray  # guess (n_u,)
+
+    @staticmethod
+    def free(
+        *,
+        p: np.ndarray,
+        x: np.ndarray,
+        u: np.ndarray = np.zeros(0),
+        x_min: np.ndarray | None = None,
+        x_max: np.ndarray | None = None,
+        u_min: np.ndarray | None = None,
+        u_max: np.ndarray | None = None,
+    ) -> StageData:
+        """Return a knot's data with infinite bounds where none are given."""
+        return StageData(
+            p=p,
+            x=x,
+            u=u,
+            x_min=np.full(len(x), -np.inf) if x_min is None else x_min,
+            x_max=np.full(len(x), np.inf) if x_max is None else x_max,
+            u_min=np.full(len(u), -np.inf) if u_min is None else u_min,
+            u_max=np.full(len(u), np.inf) if u_max is None else u_max,
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

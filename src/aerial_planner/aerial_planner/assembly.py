@@ -1,0 +1,174 @@
+"""From an optimized take-off to a timed plan: consistent velocities, the finely integrated flight, exact torques."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from aerial_model import rotation
+from aerial_model.plan import Plan
+from aerial_model.request import MotionRequest
+from aerial_model.robot import BASE_TWIST, JOINT_VELOCITY, Robot
+from aerial_planner.flight import integrate_flight
+from aerial_planner.reference import Reference
+from aerial_planner.schedule import GRAVITY, Schedule
+from aerial_planner.symbolic import BaseFrameModel
+from aerial_planner.trajectory import TakeOffTrajectory
+
+_STICTION_SPEED = 0.1  # smoothing of Coulomb friction in exact torques [rad/s]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ActuatorUse:
+    """Exact motor torques of a plan between its knots, and what they take of the limits."""
+
+    torque: np.ndarray  # (K-1, n) motor torque, losses and rotor inertia included [N·m]
+    speed: np.ndarray  # (K-1, n) [rad/s]
+    torque_ratio: np.ndarray  # (K-1, n) of the limit
+    voltage_ratio: np.ndarray  # (K-1, n)
+    speed_ratio: np.ndarray  # (K-1, n)
+    base_wrench_error: float  # largest force the plan's accelerations would need from nowhere, as a share of the weight
+
+
+def assemble(
+    request: MotionRequest,
+    robot: Robot,
+    model: BaseFrameModel,
+    schedule: Schedule,
+    reference: Reference,
+    take_off: TakeOffTrajectory,
+) -> Plan:
+    """Return the plan of an optimized take-off, in S.
+
+    The optimizer's Euler rates miss its own momentum and its fixed feet by a few per cent; the plan's velocities are the
+    nearest that satisfy A_G q̇ = [α; m ṙ] and J_c q̇ = 0 exactly.
+    """
+    N = len(schedule.contact)
+    rates = np.vstack([take_off.joint_velocity, take_off.joint_velocity[-1:]])  # (N+1, n)
+    omega = np.vstack([take_off.angular_velocity, take_off.angular_velocity[-1:]])
+    momentum = np.hstack([robot.mass * take_off.com_velocity, take_off.angular_momentum])  # linear first
+    q = _configurations(model, take_off.com, take_off.orientation, take_off.joint_position)
+    data = robot.model.createData()
+    held = np.vstack([schedule.contact, schedule.contact[-1:]])
+    v = np.array(
+        [
+            _consistent_velocity(robot, data, q[k], np.concatenate([np.zeros(3), omega[k], rates[k]]), momentum[k], held[k])
+            for k in range(N + 1)
+        ]
+    )
+    flight = integrate_flight(
+        model,
+        reference.flight_path,
+        orientation=take_off.orientation[-1],
+        angular_momentum=take_off.angular_momentum[-1],
+        joint_position=take_off.joint_position[-1],
+        joint_velocity=v[-1, JOINT_VELOCITY],
+        step=schedule.dt,
+    )
+    t = flight.time[:, None]
+    fall = np.array([0.0, 0.0, GRAVITY])
+    com = take_off.com[-1] + take_off.com_velocity[-1] * t - 0.5 * fall * t**2
+    com_velocity = take_off.com_velocity[-1] - fall * t
+    flight_q = _configurations(model, com, flight.orientation, flight.joint_position)
+    alpha = take_off.angular_momentum[-1]
+    flight_v = np.array(
+        [
+            _flying_velocity(robot, data, flight_q[k], flight.joint_velocity[k], np.concatenate([robot.mass * com_velocity[k], alpha]))
+            for k in range(len(flight_q))
+        ]
+    )
+    q = np.vstack([q, flight_q[1:]])
+    v = np.vstack([v, flight_v[1:]])
+    K, n_c = len(q), robot.n_contacts
+    contact, force = np.zeros((K, n_c), dtype=bool), np.zeros((K, n_c, 3))
+    contact[:N], force[:N] = schedule.contact, take_off.force
+    time = np.concatenate([schedule.dt * np.arange(N + 1), schedule.take_off_time + flight.time[1:]])
+    return Plan(
+        motion=request.motion,
+        robot=robot.name,
+        model_hash=robot.model_hash,
+        time=time,
+        q=q,
+        v=v,
+        com=np.vstack([take_off.com, com[1:]]),
+        com_velocity=np.vstack([take_off.com_velocity, com_velocity[1:]]),
+        angular_momentum=np.vstack([take_off.angular_momentum, np.tile(alpha, (K - N - 1, 1))]),
+        foot_position=np.array([robot.contact_positions(q_k) for q_k in q]),
+        force=force,
+        contact=contact,
+        take_off_time=schedule.take_off_time,
+        landing_time=float(time[-1]),
+        landing_joint_position=reference.landing_joint_position,
+        landing_com_height=reference.landing_com_height,
+        landing_support_centre=schedule.landing_centre,
+        landing_yaw=schedule.landing_yaw,
+        rotation=accumulated_rotation(time, q, v),
+        terrain=request.terrain,
+        request_id=request.request_id,
+    )
+
+
+def accumulated_rotation(time: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Return ∫ω dt ``(3,)`` [rad] in S over a trajectory, by the trapezoidal rule."""
+    omega = np.einsum("kab,kb->ka", rotation.matrix(q[:, 3:7]), v[:, 3:6])
+    return np.trapezoid(omega, time, axis=0)
+
+
+def actuator_use(plan: Plan, robot: Robot) -> ActuatorUse:
+    """Return the exact torques of a plan: inverse dynamics with exact Jacobians at mid-interval, plus losses."""
+    law = robot.actuators
+    data = robot.model.createData()
+    dt = np.diff(plan.time)
+    torque, speed, gap = [], [], 0.0
+    for k in range(len(dt)):
+        q = pin.interpolate(robot.model, plan.q[k], plan.q[k + 1], 0.5)
+        v = 0.5 * (plan.v[k] + plan.v[k + 1])
+        tau = pin.rnea(robot.model, data, q, v, (plan.v[k + 1] - plan.v[k]) / dt[k])
+        pin.computeJointJacobians(robot.model, data, q)
+        for i in np.flatnonzero(plan.contact[k]):
+            J = pin.getFrameJacobian(robot.model, data, robot.contact_frames[i], pin.LOCAL_WORLD_ALIGNED)[:3]
+            tau = tau - J.T @ plan.force[k, i]
+        gap = max(gap, float(np.linalg.norm(tau[:3])))
+        speed.append(v[JOINT_VELOCITY])
+        torque.append(tau[JOINT_VELOCITY] + law.friction(speed[-1], _STICTION_SPEED))
+    torque, speed = np.array(torque), np.array(speed)
+    return ActuatorUse(
+        torque=torque,
+        speed=speed,
+        torque_ratio=law.torque_ratio(torque),
+        voltage_ratio=law.voltage_ratio(torque, speed),
+        speed_ratio=law.speed_ratio(speed),
+        base_wrench_error=gap / (robot.mass * GRAVITY),
+    )
+
+
+def _configurations(model: BaseFrameModel, com: np.ndarray, orientation: np.ndarray, q_j: np.ndarray) -> np.ndarray:
+    """Return q ``(K, nq)``: the base stands where the centre of mass asks (3.7)."""
+    com_B = np.asarray(model.com.map(len(q_j))(q_j.T)).T
+    base = com - np.einsum("kab,kb->ka", rotation.matrix(orientation), com_B)
+    return np.hstack([base, orientation, q_j])
+
+
+def _consistent_velocity(
+    robot: Robot, data: pin.Data, q: np.ndarray, v: np.ndarray, momentum: np.ndarray, held: np.ndarray
+) -> np.ndarray:
+    """Return the velocity nearest to ``v`` ``(nv,)`` with this momentum ``(6,)``, linear first, and these feet at rest."""
+    A = [pin.computeCentroidalMap(robot.model, data, q).copy()]
+    pin.computeJointJacobians(robot.model, data, q)
+    pin.updateFramePlacements(robot.model, data)
+    for i in np.flatnonzero(held):
+        A.append(pin.getFrameJacobian(robot.model, data, robot.contact_frames[i], pin.LOCAL_WORLD_ALIGNED)[:3])
+    A = np.vstack(A)
+    b = np.concatenate([momentum, np.zeros(len(A) - 6)])
+    return v + np.linalg.lstsq(A, b - A @ v, rcond=1e-9)[0]
+
+
+def _flying_velocity(
+    robot: Robot, data: pin.Data, q: np.ndarray, joint_velocity: np.ndarray, momentum: np.ndarray
+) -> np.ndarray:
+    """Return v ``(nv,)`` with these joint rates and this momentum ``(6,)``, linear first."""
+    A = pin.computeCentroidalMap(robot.model, data, q)
+    base = np.linalg.solve(A[:, BASE_TWIST], momentum - A[:, JOINT_VELOCITY] @ joint_velocity)
+    return np.concatenate([base, joint_velocity])

@@ -1,0 +1,248 @@
+"""Motion in, checked plan out: the planner's block diagram."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from aerial_model import rotation
+from aerial_model.errors import RefusalCode, RefusalError
+from aerial_model.plan import Plan
+from aerial_model.request import MotionRequest
+from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, Robot
+from aerial_model.state import Estimate
+from aerial_planner.assembly import ActuatorUse, actuator_use, assemble
+from aerial_planner.checks import check, clearance_deficit
+from aerial_planner.inverse_kinematics import InverseKinematics
+from aerial_planner.kino_dynamic import KinoDynamic, Variant
+from aerial_planner.reference import Reference, body_reference
+from aerial_planner.schedule import Motion, Schedule, contact_schedule, load_motion
+from aerial_planner.screen import screen
+from aerial_planner.settings import PlannerSettings
+from aerial_planner.srbm import SingleRigidBody
+from aerial_planner.symbolic import base_frame_model
+from aerial_planner.trajectory import TakeOffTrajectory
+from aerial_planner.transcription import Solution, SolverOptions
+
+_CLEARANCE_ATTEMPTS = 4  # each flies higher by what the feet missed
+_CLEARANCE_SPARE = 0.01  # [m] added to a miss, since the pose at the edge changes with the flight
+
+Progress = Callable[[str, int, float], None]  # stage, iterations so far, residual
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlanReport:
+    """The figures of one planning request; field names are the command line's JSON keys."""
+
+    motion: str
+    robot: str
+    variant: str
+    warm_start: bool
+    solver: str
+    success: bool
+    total_time_s: float
+    solve_time_s: float
+    srbm_time_s: float
+    iterations: int
+    max_violation: float | None
+    peak_torque_ratio: float | None
+    peak_voltage_ratio: float | None
+    peak_speed_ratio: float | None
+    take_off_time_s: float | None
+    flight_time_s: float | None
+    rotation_deg: list[float] | None
+    landing_position_m: list[float] | None
+    refusal: dict[str, str] | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the report as plain JSON types."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlanningResult:
+    """A checked plan, in the start heading frame, and its figures."""
+
+    plan: Plan
+    report: PlanReport
+    actuator_use: ActuatorUse
+
+
+@dataclass
+class _Clock:
+    """Sums the time and iterations of the solves of one request."""
+
+    started: float
+    solve: float = 0.0
+    srbm: float = 0.0
+    iterations: int = 0
+
+
+class Planner:
+    """Plans motions of one robot; problems are built once per contact schedule and reused."""
+
+    def __init__(self, robot: Robot, *, solver: str = "fatrop", settings: PlannerSettings | None = None) -> None:
+        self.robot = robot
+        self.settings = settings or robot.section("planner", PlannerSettings)
+        self.options = SolverOptions(solver=solver)
+        self._model = base_frame_model(robot)
+        self._ik = InverseKinematics(robot, self._model)
+        self._srbm = SingleRigidBody(robot, self._model, self._ik, self.settings, self.options)
+        self._kino_dynamic: dict[Variant, KinoDynamic] = {}
+
+    def plan(
+        self, request: MotionRequest, start: Estimate | None = None, progress: Progress | None = None
+    ) -> PlanningResult:
+        """Return a checked plan.
+
+        Args:
+            request: motion, goal and terrain.
+            start: where the robot stands; None: its home stance.
+            progress: called after each stage.
+
+        Raises:
+            RefusalError: if the motion or goal is unknown, out of reach, or its plan fails a check; says what binds.
+        """
+        clock = _Clock(started=time.perf_counter())
+        try:
+            return self._plan(request, start, progress or (lambda *_: None), clock)
+        except RefusalError as refusal:
+            refusal.report = self._report(request, clock, refusal=refusal)
+            raise
+
+    def warm_up(self, request: MotionRequest) -> None:
+        """Build the problems of a request's schedule, so that its first plan is as fast as later ones."""
+        schedule = self._schedule(request, load_motion(request.motion), 0.0)
+        self._srbm.problem(schedule)
+        self._stage(self._variant(request)).problem(schedule)
+
+    def _plan(
+        self, request: MotionRequest, start: Estimate | None, progress: Progress, clock: _Clock
+    ) -> PlanningResult:
+        variant = self._variant(request)
+        motion = load_motion(request.motion)
+        q_start = self._start_configuration(start)
+        extra_rise = 0.0
+        for _ in range(_CLEARANCE_ATTEMPTS):
+            schedule = self._schedule(request, motion, extra_rise)
+            reference = body_reference(schedule, q_start, self.robot, self._model, self._ik, self.settings)
+            screen(request, schedule, reference, self.robot)
+            guess = self._guess(request, schedule, reference, progress, clock)
+            take_off, solution = self._optimize(variant, schedule, reference, guess, progress, clock)
+            plan = assemble(request, self.robot, self._model, schedule, reference, take_off)
+            use = actuator_use(plan, self.robot)
+            check(plan, schedule, solution, use, self.robot)
+            deficit = clearance_deficit(plan, self.robot)
+            if deficit == 0.0:
+                progress("checked", clock.iterations, solution.max_violation)
+                report = self._report(request, clock, plan=plan, solution=solution, use=use)
+                return PlanningResult(plan=plan, report=report, actuator_use=use)
+            extra_rise += deficit + _CLEARANCE_SPARE
+        raise RefusalError(
+            RefusalCode.CHECK_FAILED,
+            f"platform edge: a foot would pass {100 * deficit:.1f} cm too low over the terrain, also on a higher flight",
+        )
+
+    def _guess(
+        self, request: MotionRequest, schedule: Schedule, reference: Reference, progress: Progress, clock: _Clock
+    ) -> TakeOffTrajectory:
+        """Return where the kino-dynamic stage starts: the single-rigid-body optimum, or the bare reference."""
+        if not request.warm_start:
+            return self._srbm.reference_trajectory(schedule, reference)
+        began = time.perf_counter()
+        guess, solution = self._srbm.solve(schedule, reference)
+        clock.srbm += time.perf_counter() - began
+        clock.iterations += solution.iterations
+        progress("srbm", clock.iterations, solution.max_violation)
+        if not solution.converged:
+            raise RefusalError(
+                RefusalCode.OUT_OF_REACH,
+                f"out of reach: even a single rigid body with the robot's leg length and friction cannot leave the ground "
+                f"so as to land at {_position(request)} after {schedule.flight_time:.2f} s of flight",
+            )
+        return guess
+
+    def _optimize(
+        self,
+        variant: Variant,
+        schedule: Schedule,
+        reference: Reference,
+        guess: TakeOffTrajectory,
+        progress: Progress,
+        clock: _Clock,
+    ) -> tuple[TakeOffTrajectory, Solution]:
+        began = time.perf_counter()
+        take_off, solution = self._stage(variant).solve(schedule, reference, guess)
+        clock.solve += time.perf_counter() - began
+        clock.iterations += solution.iterations
+        progress("kino_dynamic", clock.iterations, solution.max_violation)
+        return take_off, solution
+
+    def _schedule(self, request: MotionRequest, motion: Motion, extra_rise: float) -> Schedule:
+        settings = self.settings
+        return contact_schedule(request, motion, self.robot, settings.dt, settings.flight_knots, extra_rise)
+
+    def _stage(self, variant: Variant) -> KinoDynamic:
+        if variant not in self._kino_dynamic:
+            self._kino_dynamic[variant] = KinoDynamic(self.robot, self._model, self.settings, variant, self.options)
+        return self._kino_dynamic[variant]
+
+    def _variant(self, request: MotionRequest) -> Variant:
+        try:
+            return Variant(request.variant or Variant.AAKD_STAR)
+        except ValueError:
+            known = ", ".join(Variant)
+            raise RefusalError(
+                RefusalCode.INVALID_REQUEST, f"unknown variant '{request.variant}'; known: {known}"
+            ) from None
+
+    def _start_configuration(self, start: Estimate | None) -> np.ndarray:
+        """Return q ``(nq,)`` in the start heading frame."""
+        if start is None:
+            return self.robot.standing_configuration()
+        origin, yaw = self.robot.start_frame(start.q)
+        turn = rotation.about_z(-yaw)
+        q = np.array(start.q, dtype=float)
+        q[BASE_POSITION] = rotation.matrix(turn) @ (q[BASE_POSITION] - origin)
+        q[BASE_ORIENTATION] = rotation.multiply(turn, q[BASE_ORIENTATION])
+        return q
+
+    def _report(
+        self,
+        request: MotionRequest,
+        clock: _Clock,
+        *,
+        plan: Plan | None = None,
+        solution: Solution | None = None,
+        use: ActuatorUse | None = None,
+        refusal: RefusalError | None = None,
+    ) -> PlanReport:
+        return PlanReport(
+            motion=request.motion,
+            robot=self.robot.name,
+            variant=request.variant,
+            warm_start=request.warm_start,
+            solver=self.options.solver,
+            success=plan is not None,
+            total_time_s=time.perf_counter() - clock.started,
+            solve_time_s=clock.solve,
+            srbm_time_s=clock.srbm,
+            iterations=clock.iterations,
+            max_violation=None if solution is None else solution.max_violation,
+            peak_torque_ratio=None if use is None else float(use.torque_ratio.max()),
+            peak_voltage_ratio=None if use is None else float(use.voltage_ratio.max()),
+            peak_speed_ratio=None if use is None else float(use.speed_ratio.max()),
+            take_off_time_s=None if plan is None else plan.take_off_time,
+            flight_time_s=None if plan is None else plan.landing_time - plan.take_off_time,
+            rotation_deg=None if plan is None else np.rad2deg(plan.rotation).tolist(),
+            landing_position_m=None if plan is None else plan.landing_support_centre.tolist(),
+            refusal=None if refusal is None else {"code": refusal.code.value, "reason": refusal.reason},
+        )
+
+
+def _position(request: MotionRequest) -> str:
+    return "({:.2f}, {:.2f}, {:.2f}) m".format(*request.displacement)

@@ -1,0 +1,288 @@
+"""The single-rigid-body stage (3.15)–(3.19): a small problem whose optimum starts the kino-dynamic one.
+
+    take-off knot   x = [r, ṙ, α, quaternion],   u = [f of the loaded contacts]
+    flight knot     x = [α, quaternion],         no control
+
+All links are lumped at the home pose, so the body rate is ω = I⁻¹ Rᵀ α. Contacts stand where the robot stands; a leg
+reaches no farther than (3.18) allows. Joint trajectories then come from inverse kinematics.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from aerial_model import rotation
+from aerial_model.contact import friction_pyramid
+from aerial_model.robot import BASE_ORIENTATION, Robot
+from aerial_planner.inverse_kinematics import InverseKinematics
+from aerial_planner.reference import Reference
+from aerial_planner.schedule import GRAVITY, Schedule
+from aerial_planner.settings import PlannerSettings
+from aerial_planner.symbolic import (
+    BaseFrameModel,
+    attitude_error,
+    conjugate,
+    quaternion_product,
+    quaternion_step,
+    rotation_matrix,
+)
+from aerial_planner.trajectory import TakeOffTrajectory
+from aerial_planner.transcription import Problem, Rows, Solution, SolverOptions, StageData, StageKind
+
+_REACH_SAMPLES = 2000  # random poses from which the longest leg is read
+
+
+class SingleRigidBody:
+    """Builds and solves the single-rigid-body problems of one robot; a problem is built once per contact schedule."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        model: BaseFrameModel,
+        ik: InverseKinematics,
+        settings: PlannerSettings,
+        options: SolverOptions,
+    ) -> None:
+        self.robot = robot
+        self.model = model
+        self.ik = ik
+        self.settings = settings
+        self.options = options
+        home = robot.poses["home"]
+        self.inertia = np.asarray(model.inertia(home))  # (3, 3) about the centre of mass, in B [kg·m²]
+        self.inertia_inverse = np.linalg.inv(self.inertia)
+        self.attachment, self.leg_length = _legs(robot, model)  # (n_c, 3) from the centre of mass in B; (n_c,) [m]
+        self._problems: dict[bytes, Problem] = {}
+        self._kinds: dict[tuple, StageKind] = {}
+
+    def solve(self, schedule: Schedule, reference: Reference) -> tuple[TakeOffTrajectory, Solution]:
+        """Return the optimum near the reference, with joint trajectories, and the solver's account of it."""
+        solution = self.problem(schedule).solve(self._stages(schedule, reference))
+        return self._trajectory(schedule, reference, solution), solution
+
+    def reference_trajectory(self, schedule: Schedule, reference: Reference) -> TakeOffTrajectory:
+        """Return the bare reference as a guess: what a kino-dynamic stage without warm start begins from."""
+        N, M = len(schedule.contact), schedule.flight_knots
+        n_f = np.maximum(1, schedule.contact.sum(axis=1))[:, None, None]
+        share = np.array([0.0, 0.0, self.robot.mass * GRAVITY])
+        pose = reference.joint_position[-1]
+        return TakeOffTrajectory(
+            com=reference.com,
+            com_velocity=reference.com_velocity,
+            angular_momentum=reference.angular_momentum,
+            orientation=reference.orientation,
+            joint_position=reference.joint_position,
+            angular_velocity=np.zeros((N, 3)),
+            joint_velocity=np.zeros((N, self.robot.n_joints)),
+            force=schedule.contact[..., None] * share / n_f,
+            flight_orientation=np.tile(reference.orientation[-1], (M + 1, 1)),
+            flight_joint_position=reference.flight_path.at(pose, reference.flight_path.dt * np.arange(M + 1))[0],
+            flight_angular_velocity=np.zeros((M, 3)),
+        )
+
+    def problem(self, schedule: Schedule) -> Problem:
+        """Return the problem of a schedule, built at its first use."""
+        key = schedule.contact.tobytes() + bytes([schedule.flight_knots])
+        if key not in self._problems:
+            rows = [tuple(bool(b) for b in row) for row in schedule.contact]
+            kinds = [self._take_off_kind(row, first=k == 0) for k, row in enumerate(rows)]
+            kinds.append(self._lift_off_kind(rows[-1]))
+            kinds += [self._flight_kind()] * (schedule.flight_knots - 1)
+            kinds.append(self._touchdown_kind())
+            self._problems[key] = Problem(kinds, self.options)
+        return self._problems[key]
+
+    def _take_off_kind(self, loaded: tuple[bool, ...], *, first: bool) -> StageKind:
+        key = ("take_off", loaded, first)
+        if key in self._kinds:
+            return self._kinds[key]
+        robot, w = self.robot, self.settings.weights
+        s = _BodySymbols(robot.n_contacts)
+        force = {int(i): ca.SX.sym(f"f_{i}", 3) for i in np.flatnonzero(loaded)}
+        u = ca.vertcat(*force.values())
+        dt, r_ref, rdot_ref, quaternion_ref = ca.SX.sym("dt"), *(ca.SX.sym(n, 3) for n in ("r", "v")), ca.SX.sym("q", 4)
+        x_0 = ca.SX.sym("x_0", 13)
+
+        cost = (
+            w.com * ca.sumsqr(s.r - r_ref)
+            + w.com_velocity * ca.sumsqr(s.rdot - rdot_ref)
+            + w.orientation * ca.sumsqr(attitude_error(s.quaternion, quaternion_ref))
+            + w.angular_velocity * ca.sumsqr(s.omega(self.inertia_inverse))
+            + w.force * ca.sumsqr(u)
+        )
+
+        rddot, alpha_dot = -ca.vertcat(0, 0, GRAVITY), ca.SX.zeros(3)
+        for i, f in force.items():
+            rddot += f / robot.mass
+            alpha_dot += ca.cross(s.foot_ref[:, i] - s.r, f)
+        rdot_next = s.rdot + rddot * dt
+        following = ca.vertcat(
+            s.r + 0.5 * (s.rdot + rdot_next) * dt,
+            rdot_next,
+            s.alpha + alpha_dot * dt,
+            quaternion_product(s.quaternion, quaternion_step(s.omega(self.inertia_inverse), dt)),
+        )
+
+        rows = Rows()
+        if first:
+            rows.equal(s.x - x_0)
+        else:
+            self._reach_rows(rows, s, loaded)
+        pyramid = friction_pyramid(robot.friction_coefficient)[:4]
+        for f in force.values():
+            rows.between(ca.DM(pyramid) @ f, 0.0, np.inf)
+        p = ca.vertcat(dt, r_ref, rdot_ref, quaternion_ref, ca.vec(s.foot_ref), x_0)
+        self._kinds[key] = rows.stage(f"body_{len(self._kinds)}", s.x, u, p, cost, following)
+        return self._kinds[key]
+
+    def _reach_rows(self, rows: Rows, s: _BodySymbols, held: tuple[bool, ...]) -> None:
+        """Add (3.18): the distance from a held contact to its leg's attachment is at most β ℓ."""
+        for i in np.flatnonzero(held):
+            leg = s.foot_ref[:, i] - (s.r + s.R @ ca.DM(self.attachment[i]))
+            length = self.settings.reach * self.leg_length[i]
+            rows.between(ca.sumsqr(leg) / length**2, -np.inf, 1.0)
+
+    def _lift_off_kind(self, held: tuple[bool, ...]) -> StageKind:
+        key = ("lift_off", held)
+        if key not in self._kinds:
+            s = _BodySymbols(self.robot.n_contacts)
+            dt, T, lead, landing_com = ca.SX.sym("dt"), ca.SX.sym("T"), ca.SX.sym("lead"), ca.SX.sym("goal", 3)
+            rows = Rows()
+            self._reach_rows(rows, s, held)
+            rows.equal(s.landing_gap(T, lead, landing_com))
+            p = ca.vertcat(dt, T, lead, landing_com, ca.vec(s.foot_ref))
+            following = _flight_step(s.alpha, s.quaternion, dt, self.inertia_inverse)
+            self._kinds[key] = rows.stage("body_lift_off", s.x, ca.SX(0, 1), p, ca.SX(0), following)
+        return self._kinds[key]
+
+    def _flight_kind(self) -> StageKind:
+        key = ("flight",)
+        if key not in self._kinds:
+            alpha, quaternion, dt = ca.SX.sym("alpha", 3), ca.SX.sym("quat", 4), ca.SX.sym("dt")
+            x, following = ca.vertcat(alpha, quaternion), _flight_step(alpha, quaternion, dt, self.inertia_inverse)
+            self._kinds[key] = Rows().stage("body_flight", x, ca.SX(0, 1), dt, ca.SX(0), following)
+        return self._kinds[key]
+
+    def _touchdown_kind(self) -> StageKind:
+        key = ("touchdown",)
+        if key not in self._kinds:
+            x, goal = ca.SX.sym("x", 7), ca.SX.sym("goal", 4)
+            rows = Rows()
+            rows.attitude(x[3:7], goal)
+            self._kinds[key] = rows.stage("body_touchdown", x, ca.SX(0, 1), goal, ca.SX(0), None)
+        return self._kinds[key]
+
+    def _stages(self, schedule: Schedule, reference: Reference) -> list[StageData]:
+        settings = self.settings
+        foot_ref = reference.foot_position.ravel()
+        weight = self.robot.mass * GRAVITY
+        x = np.hstack(
+            [reference.com, reference.com_velocity, reference.angular_momentum, reference.orientation]
+        )
+        stages = []
+        for k, loaded in enumerate(schedule.contact):
+            n_f = int(loaded.sum())
+            p = [[schedule.dt], reference.com[k], reference.com_velocity[k], reference.orientation[k]]
+            p += [foot_ref, reference.x_0[:13]]
+            stages.append(
+                StageData.free(
+                    p=np.concatenate(p),
+                    x=x[k],
+                    u=np.tile([0.0, 0.0, weight / n_f], n_f),
+                    u_min=np.tile([-np.inf, -np.inf, settings.force_min], n_f),
+                    u_max=np.tile([np.inf, np.inf, settings.force_max], n_f),
+                )
+            )
+        dt = schedule.flight_time / schedule.flight_knots
+        p = [[dt, schedule.flight_time, settings.landing_lead], reference.landing_com, foot_ref]
+        stages.append(StageData.free(p=np.concatenate(p), x=x[-1]))
+        flight = self._flight_orientations(schedule, reference.orientation[-1], reference.angular_momentum[-1])
+        for k in range(1, schedule.flight_knots + 1):
+            last = k == schedule.flight_knots
+            x_k = np.concatenate([reference.angular_momentum[-1], flight[k]])
+            stages.append(StageData.free(p=schedule.landing_orientation if last else np.array([dt]), x=x_k))
+        return stages
+
+    def _flight_orientations(self, schedule: Schedule, orientation: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+        """Return the attitudes ``(M+1, 4)`` of the lumped body in free flight."""
+        dt = schedule.flight_time / schedule.flight_knots
+        attitudes = [orientation]
+        for _ in range(schedule.flight_knots):
+            omega = self.inertia_inverse @ (rotation.matrix(attitudes[-1]).T @ alpha)
+            attitudes.append(rotation.multiply(attitudes[-1], rotation.exp(omega * dt)))
+        return np.array(attitudes)
+
+    def _trajectory(self, schedule: Schedule, reference: Reference, solution: Solution) -> TakeOffTrajectory:
+        N = len(schedule.contact)
+        x = np.array(solution.x[: N + 1])
+        com, alpha, quaternion = x[:, :3], x[:, 6:9], x[:, 9:13]
+        R = rotation.matrix(quaternion)  # (N+1, 3, 3)
+        feet = np.einsum("kba,kib->kia", R, reference.foot_position[None] - com[:, None])  # from the CoM, in B
+        q_j = self.ik.solve(feet, reference.joint_position)
+        force = np.zeros((N, self.robot.n_contacts, 3))
+        for k in range(N):
+            force[k][schedule.contact[k]] = solution.u[k].reshape(-1, 3)
+        flight = np.array([x[N][6:], *solution.x[N + 1 :]])
+        omega = np.einsum("ab,kcb,kc->ka", self.inertia_inverse, R.transpose(0, 2, 1), alpha)
+        flight_R = rotation.matrix(flight[:, 3:])
+        dt = reference.flight_path.dt
+        flight_omega = np.einsum("ab,kcb,kc->ka", self.inertia_inverse, flight_R.transpose(0, 2, 1), flight[:, :3])
+        return TakeOffTrajectory(
+            com=com,
+            com_velocity=x[:, 3:6],
+            angular_momentum=alpha,
+            orientation=quaternion,
+            joint_position=q_j,
+            angular_velocity=omega[:-1],
+            joint_velocity=np.diff(q_j, axis=0) / schedule.dt,
+            force=force,
+            flight_orientation=flight[:, 3:],
+            flight_joint_position=reference.flight_path.at(q_j[-1], dt * np.arange(schedule.flight_knots + 1))[0],
+            flight_angular_velocity=flight_omega[:-1],
+        )
+
+
+class _BodySymbols:
+    """Symbols of a take-off knot of the single rigid body."""
+
+    def __init__(self, n_c: int) -> None:
+        self.r, self.rdot, self.alpha = (ca.SX.sym(name, 3) for name in ("r", "rdot", "alpha"))
+        self.quaternion = ca.SX.sym("quat", 4)
+        self.x = ca.vertcat(self.r, self.rdot, self.alpha, self.quaternion)
+        self.foot_ref = ca.SX.sym("foot_ref", 3, n_c)
+        self.R = rotation_matrix(self.quaternion)
+
+    def omega(self, inertia_inverse: np.ndarray) -> ca.SX:
+        """Return the body rate ``(3,)`` in B [rad/s]."""
+        return ca.DM(inertia_inverse) @ (self.R.T @ self.alpha)
+
+    def landing_gap(self, T: ca.SX, lead: ca.SX, landing_com: ca.SX) -> ca.SX:
+        """Return where the ballistic path ends, led by its horizontal velocity, relative to the goal ``(3,)`` [m]."""
+        landing = self.r + T * self.rdot - ca.vertcat(0, 0, 0.5 * GRAVITY * T**2)
+        return landing + lead * ca.vertcat(self.rdot[:2], 0) - landing_com
+
+
+def _flight_step(alpha: ca.SX, quaternion: ca.SX, dt: ca.SX, inertia_inverse: np.ndarray) -> ca.SX:
+    """Return α and the attitude after ``dt`` of free flight of the lumped body, by the mid-point rule."""
+    J = ca.DM(inertia_inverse)
+    omega = J @ (rotation_matrix(quaternion).T @ alpha)
+    middle = quaternion_product(quaternion, quaternion_step(omega, 0.5 * dt))
+    omega_mid = J @ (rotation_matrix(middle).T @ alpha)
+    return ca.vertcat(alpha, quaternion_product(quaternion, quaternion_step(omega_mid, dt)))
+
+
+def _legs(robot: Robot, model: BaseFrameModel) -> tuple[np.ndarray, np.ndarray]:
+    """Return where each contact's leg is attached, from the centre of mass in B, and how far the contact reaches."""
+    home = robot.poses["home"]
+    com = np.asarray(model.com(home)).ravel()
+    attachment = []
+    for frame_id in robot.contact_frames:
+        joint = robot.model.frames[frame_id].parentJoint
+        while robot.model.parents[joint] > 1:
+            joint = robot.model.parents[joint]
+        attachment.append(robot.model.jointPlacements[joint].translation)
+    attachment = np.array(attachment)
+    poses = np.random.default_rng(0).uniform(*robot.planning_range, size=(_REACH_SAMPLES, robot.n_joints))
+    feet = np.asarray(model.feet.map(len(poses))(poses.T)).T.reshape(len(poses), robot.n_contacts, 3)
+    return attachment - com, np.max(np.linalg.norm(feet - attachment, axis=2), axis=0)
