@@ -228,11 +228,6 @@ def test_more_than_one_per_cent_of_ticks_beyond_a_limit_fails_within_limits_alon
     assert getattr(result, field) == 1.2
 
 
-def test_torque_the_controller_wanted_counts_even_if_it_clamped_it(verdict, ticks):
-    wanted = [dataclasses.replace(tick, saturated=k < 12) for k, tick in enumerate(ticks)]
-    assert verdict(wanted).failed == ("within_limits",)
-
-
 def test_one_fallback_fails_no_fallback_alone(verdict, ticks):
     ticks[100] = dataclasses.replace(ticks[100], fallback=True)
     assert verdict(ticks).failed == ("no_fallback",)

@@ -1,7 +1,7 @@
 """Did it land? The project's one definition, decided from ground truth; the controller's opinion is not asked.
 
-Two things only the controller can know are taken from it, and can only spoil a landing: in which ticks it wanted more
-torque than the limits allow (it may have clamped the wish before the drives saw it), and in which it fell back.
+One thing only the controller can know is taken from it, and can only spoil a landing: in which ticks it fell back.
+Controllers ask for what a motion needs, also beyond a limit; the drives limit it, and the simulator records the wish.
 """
 
 from __future__ import annotations
@@ -35,7 +35,6 @@ class Tick:
     """One control period of a motion."""
 
     truth: GroundTruth
-    saturated: bool = False  # the controller wanted a torque beyond a limit
     fallback: bool = False  # the controller's optimization failed and its fallback acted
 
 
@@ -113,7 +112,7 @@ def judge(robot: Robot, plan: Plan, *, origin: np.ndarray, heading: float, start
     position_tolerance = min(POSITION_TOLERANCE_MAX, POSITION_TOLERANCE + POSITION_TOLERANCE_PER_DISTANCE * distance)
     tilt = rotation.tilt(final.q[BASE_ORIENTATION])
     rotation_error = float(np.linalg.norm(turned - placed.rotation))
-    beyond = [tick.saturated or max(tick.truth.peak_torque_ratio, tick.truth.peak_voltage_ratio) > 1 for tick in ticks]
+    beyond = [max(truth.peak_torque_ratio, truth.peak_voltage_ratio) > 1 for truth in truths]
     return Landing(
         checks={
             "airborne": airborne * period >= AIRBORNE_FRACTION * (plan.landing_time - plan.take_off_time),

@@ -1,0 +1,142 @@
+"""One motion in closed loop, in one process and without ROS: stand, plan, execute, observe, judge.
+
+Simulated time stands still while the planner thinks, so that equal seeds give equal runs to the last bit.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from aerial_evaluation.landing import OBSERVE_TIME, Landing, Tick, judge
+from aerial_model.request import MotionRequest
+from aerial_model.robot import Robot
+from aerial_model.terrain import Terrain
+from aerial_planner.planner import Planner, PlanningResult, Progress
+from aerial_sim.simulation import Simulation
+from aerial_wbic.controller import Controller
+
+STAND_TIME = 0.5  # before the plan is asked for [s]
+MICRO = 1e6  # microseconds in a second
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What came of one motion."""
+
+    landing: Landing
+    planning: PlanningResult
+    terrain: Terrain  # in W
+    ticks: list[Tick] = field(repr=False)  # from the first, standing included
+    start_time: float  # when the controller accepted the plan [s]
+    tick_time: np.ndarray  # (ticks,) wall time of the controller's steps [s]
+    real_time_factor: float  # simulated over wall time, simulator and controller together
+    seed: int
+    noise: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what ``./aerial simulate --json`` prints."""
+        return {
+            **self.landing.to_json(),
+            "tick_us": {
+                "p50": float(np.percentile(self.tick_time, 50) * MICRO),
+                "p99": float(np.percentile(self.tick_time, 99) * MICRO),
+                "max": float(self.tick_time.max() * MICRO),
+            },
+            "real_time_factor": self.real_time_factor,
+            "plan": self.planning.report.to_json(),
+            "motion": self.planning.plan.motion,
+            "robot": self.planning.plan.robot,
+            "noise": self.noise,
+            "seed": self.seed,
+        }
+
+
+class Loop:
+    """Simulator and controller, tick by tick, with the record of it.
+
+    Args:
+        simulation: stands in for the robot.
+        controller: fresh; it sees measurements only.
+    """
+
+    def __init__(self, simulation: Simulation, controller: Controller) -> None:
+        self.simulation = simulation
+        self.controller = controller
+        self.ticks: list[Tick] = []
+        self.tick_times: list[float] = []  # [s]
+        self.wall_time = 0.0  # spent in ``advance`` [s]
+
+    def advance(self, duration: float) -> None:
+        """Run for ``duration`` [s] of simulated time."""
+        began = time.perf_counter()
+        for _ in range(round(duration / self.simulation.control_dt)):
+            self._tick()
+        self.wall_time += time.perf_counter() - began
+
+    def _tick(self) -> None:
+        fallbacks = self.controller.status.fallback_ticks
+        began = time.perf_counter()
+        command = self.controller.step(self.simulation.measure())
+        self.tick_times.append(time.perf_counter() - began)
+        self.simulation.step(command)
+        fallback = self.controller.status.fallback_ticks > fallbacks
+        self.ticks.append(Tick(truth=self.simulation.ground_truth(), fallback=fallback))
+
+
+def run(
+    robot: Robot,
+    request: MotionRequest,
+    *,
+    seed: int = 0,
+    noise: str = "nominal",
+    planner: Planner | None = None,
+    progress: Progress | None = None,
+) -> Outcome:
+    """Return what comes of ``request`` when it is planned and executed in simulation.
+
+    Args:
+        robot: that is to move.
+        request: the motion, its goal and its terrain.
+        seed: of the simulation.
+        noise: ``"nominal"`` or ``"off"``.
+        planner: for this robot, to reuse one that is warm.
+        progress: handed to the planner.
+
+    Raises:
+        RefusalError: if planner or controller refuse.
+    """
+    planner = planner or Planner(robot)
+    simulation = Simulation(robot, seed=seed, noise=noise)
+    if request.terrain.floor < 0:
+        simulation.set_terrain(terrain_in_world(robot, request.terrain, simulation.state()[0]))
+        simulation.reset(seed)  # onto the platform it is to jump off
+    loop = Loop(simulation, Controller(robot))
+    loop.advance(STAND_TIME)
+
+    simulation.set_terrain(terrain_in_world(robot, request.terrain, simulation.state()[0]))
+    planning = planner.plan(request, loop.controller.estimate, progress)
+    origin, heading = robot.start_frame(simulation.state()[0])
+    start_time = simulation.time
+    loop.controller.accept(planning.plan)
+    loop.advance(planning.plan.landing_time + OBSERVE_TIME)
+    return Outcome(
+        landing=judge(robot, planning.plan, origin=origin, heading=heading, start_time=start_time, ticks=loop.ticks),
+        planning=planning,
+        terrain=simulation.terrain,
+        ticks=loop.ticks,
+        start_time=start_time,
+        tick_time=np.array(loop.tick_times),
+        real_time_factor=simulation.time / loop.wall_time,
+        seed=seed,
+        noise=noise,
+    )
+
+
+def terrain_in_world(robot: Robot, terrain: Terrain, q: np.ndarray) -> Terrain:
+    """Return a request's terrain in W, for a robot that stands at ``q`` ``(nq,)`` in W; the floor comes to lie at 0."""
+    origin, heading = robot.start_frame(q)
+    return terrain.placed(np.array([origin[0], origin[1], -terrain.floor]), heading)
