@@ -23,6 +23,7 @@ class Kinematics:
     def at(self, q: np.ndarray, v: np.ndarray) -> Configuration:
         """Return the robot at ``q`` ``(nq,)`` with velocity ``v`` ``(nv,)``."""
         model, data = self.robot.model, self._data
+        pin.computeMinverse(model, data, q)
         pin.computeAllTerms(model, data, q, v)
         # Second order at zero acceleration: the bias terms J̇ q̇ and Ȧ_G q̇.
         pin.computeCentroidalMomentumTimeVariation(model, data, q, v, self._zero)
@@ -46,6 +47,12 @@ class Configuration:
     def M(self) -> np.ndarray:  # noqa: N802  (the field's symbol)
         """Mass matrix H ``(nv, nv)``, rotor inertia included."""
         upper = np.triu(self._data.M)
+        return upper + np.triu(upper, 1).T
+
+    @property
+    def M_inv(self) -> np.ndarray:  # noqa: N802
+        """Inverse of the mass matrix H⁻¹ ``(nv, nv)``."""
+        upper = np.triu(self._data.Minv)
         return upper + np.triu(upper, 1).T
 
     @property

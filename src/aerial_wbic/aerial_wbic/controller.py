@@ -1,0 +1,154 @@
+"""The whole-body controller: a measurement in, a command out, 500 times a second.
+
+    estimator → phase → tasks → hierarchy → qp → drive
+
+Without a plan the robot stands. A plan is followed from take-off through flight to its landing time; then the robot comes
+to rest over its feet and stands again, ready for the next.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from aerial_model.errors import RefusalCode, RefusalError
+from aerial_model.kinematics import Configuration, Kinematics
+from aerial_model.plan import Plan
+from aerial_model.robot import Robot
+from aerial_model.state import Command, Estimate, Measurement
+from aerial_wbic.acceptance import check_start
+from aerial_wbic.consistency import consistent
+from aerial_wbic.drive import Drive
+from aerial_wbic.estimator import Estimator
+from aerial_wbic.gains import ControllerGains
+from aerial_wbic.hierarchy import prioritized
+from aerial_wbic.phase import DAMPED, FOLLOWING, Phase, Phases
+from aerial_wbic.qp import ForceOptimization
+from aerial_wbic.target import WholeBodyTarget
+from aerial_wbic.tasks import Limbs, attitude_error, prioritized_tasks
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ControllerStatus:
+    """How the controller is doing; errors are plan minus estimate in W, zero while no plan is followed."""
+
+    phase: Phase
+    at_rest: bool  # it stands and takes a plan
+    time_in_plan: float  # [s]
+    request_id: str  # of the plan that runs, or empty
+    ticks: int  # measurements answered
+    saturated_ticks: int  # of these, with a torque beyond a limit
+    fallback_ticks: int  # of these, with the fallback's forces
+    com_error: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) [m]
+    com_velocity_error: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) [m/s]
+    orientation_error: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) rotation vector [rad]
+    angular_momentum_error: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) [kg·m²/s]
+
+
+class Controller:
+    """One robot's controller.
+
+    Args:
+        robot: with a section ``controller`` in its ``robot.yaml``.
+
+    Raises:
+        ConfigurationError: for a missing or misspelt gain.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self._gains = robot.section("controller", ControllerGains)
+        self._limbs = Limbs(robot)
+        self._kinematics = Kinematics(robot)
+        self._qp = ForceOptimization(robot, self._gains.weight_base, self._gains.weight_force)
+        self._estimator = Estimator(robot, self._gains.estimator)
+        self._home_height = _home_height(robot, self._kinematics)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget estimate, plan, stop and counters; stand from the next measurement on."""
+        self._estimator.reset()
+        self._phases = Phases(self.robot, self._gains, self._home_height)
+        self._drive = Drive(self.robot, self._gains)
+        self._now: tuple[Configuration, WholeBodyTarget] | None = None  # what the last tick saw and wanted
+        self.estimate: Estimate | None = None  # in the odom frame; None before the first measurement
+        self._ticks = self._fallback_ticks = 0
+
+    def step(self, measurement: Measurement) -> Command:
+        """Return the answer to a measurement."""
+        self._ticks += 1
+        self._phases.tick(measurement.time)
+        self.estimate = self._estimator.update(measurement, self._phases.contacts())
+        state = self._kinematics.at(self.estimate.q, self.estimate.v)
+        if self._phases.judge(state) in DAMPED:
+            return self._drive.damped(measurement)
+        target = self._phases.target(state)
+        vdot_cmd = prioritized(state.M_inv, prioritized_tasks(state, target, self._limbs, self._gains))
+        solution = self._qp.solve(state, vdot_cmd, target.force, target.contact)
+        self._fallback_ticks += not solution.solved
+        self._now = (state, target)
+        return self._drive.command(state, target, solution, measurement)
+
+    def accept(self, plan: Plan) -> None:
+        """Begin ``plan``, given in the start heading frame, with the next measurement.
+
+        Raises:
+            InvalidPlanError: if it is inconsistent, not finite or for another robot.
+            RefusalError: if a plan runs, the robot does not stand, or it stands elsewhere than the plan begins.
+        """
+        plan.checked(self.robot)
+        if self._phases.plan is not None:
+            raise RefusalError(RefusalCode.BUSY, f"motion '{self._phases.plan.motion}' still runs")
+        if self.estimate is None or not self._phases.at_rest:
+            raise RefusalError(RefusalCode.NOT_STANDING, f"the robot is not at rest; its phase is {self.phase.name}")
+        check_start(plan, self.estimate, self.robot, self._gains)
+        origin, yaw = self.robot.start_frame(self.estimate.q)
+        self._phases.follow(consistent(plan, Kinematics(self.robot), self._limbs).placed(origin, yaw))
+
+    def abort(self) -> None:
+        """Call off the motion that runs and come to rest, as long as every foot is on the ground.
+
+        Raises:
+            RefusalError: if no motion runs or a foot has left the ground.
+        """
+        self._phases.abort()
+
+    def stop(self) -> None:
+        """Emergency stop: joints are only damped until ``reset``."""
+        self._phases.stop()
+
+    @property
+    def phase(self) -> Phase:
+        """What the controller is doing."""
+        return self._phases.phase
+
+    @property
+    def status(self) -> ControllerStatus:
+        """How the controller is doing, as of the last tick."""
+        plan = self._phases.plan
+        return ControllerStatus(
+            phase=self.phase,
+            at_rest=self._phases.at_rest,
+            time_in_plan=self._phases.time_in_plan,
+            request_id="" if plan is None else plan.request_id,
+            ticks=self._ticks,
+            saturated_ticks=self._drive.saturated_ticks,
+            fallback_ticks=self._fallback_ticks,
+            **(self._errors() if self.phase in FOLLOWING and self._now else {}),
+        )
+
+    def _errors(self) -> dict[str, np.ndarray]:
+        state, target = self._now
+        return {
+            "com_error": target.body.com - state.com,
+            "com_velocity_error": target.body.com_velocity - state.com_velocity,
+            "orientation_error": attitude_error(target.body.orientation, state.base_orientation),
+            "angular_momentum_error": target.angular_momentum - state.angular_momentum,
+        }
+
+
+def _home_height(robot: Robot, kinematics: Kinematics) -> float:
+    """Return the height of the centre of mass above the ground in the home pose [m]."""
+    state = kinematics.at(robot.standing_configuration("home"), np.zeros(robot.model.nv))
+    return float(state.com[2])

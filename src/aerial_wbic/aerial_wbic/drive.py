@@ -1,0 +1,76 @@
+"""From accelerations and forces to what the motor boards are told, and the count of what they cannot give."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aerial_model.kinematics import Configuration
+from aerial_model.robot import JOINT_VELOCITY, Robot
+from aerial_model.state import Command, Measurement
+from aerial_wbic.gains import ControllerGains
+from aerial_wbic.qp import Solution
+from aerial_wbic.target import WholeBodyTarget
+
+
+class Drive:
+    """Inverse dynamics, friction feed-forward and limits.
+
+    A command asks for what the motion needs, also beyond a limit: the boards limit it by the same actuator law, and
+    ``saturated_ticks`` tells how often.
+    """
+
+    def __init__(self, robot: Robot, gains: ControllerGains) -> None:
+        self._law = robot.actuators
+        self._stiction_speed = gains.stiction_speed
+        n = robot.n_joints
+        self._zeros = np.zeros(n)
+        self._joint_damping = np.full(n, gains.joint_damping)
+        self._stop_damping = np.full(n, gains.stop_damping)
+        self.saturated_ticks = 0
+
+    def command(
+        self, state: Configuration, target: WholeBodyTarget, solution: Solution, measurement: Measurement
+    ) -> Command:
+        """Return the command for an acceleration and forces that obey the base's equations of motion.
+
+        τ = joint rows of H q̈ + C q̇ + G − J_cᵀ f_r, plus the friction the motion will meet. Damping about the target's
+        joint velocity rides along.
+        """
+        torque = inverse_dynamics(state, solution) + self._law.friction(target.joint_velocity, self._stiction_speed)
+        command = Command(
+            torque=torque,
+            position=target.joint_position,
+            velocity=target.joint_velocity,
+            stiffness=self._zeros,
+            damping=self._joint_damping,
+            state_time=measurement.time,
+            state_sequence=measurement.sequence,
+        )
+        self._count(command, measurement)
+        return command
+
+    def damped(self, measurement: Measurement) -> Command:
+        """Return the command of a robot that is stopped: its joints only resist motion."""
+        return Command(
+            torque=self._zeros,
+            position=measurement.joint_position,
+            velocity=self._zeros,
+            stiffness=self._zeros,
+            damping=self._stop_damping,
+            state_time=measurement.time,
+            state_sequence=measurement.sequence,
+        )
+
+    def _count(self, command: Command, measurement: Measurement) -> None:
+        torque = command.requested_torque(measurement.joint_position, measurement.joint_velocity)
+        lower, upper = self._law.torque_bounds(measurement.joint_velocity)
+        if np.any(torque < lower) or np.any(torque > upper):
+            self.saturated_ticks += 1
+
+
+def inverse_dynamics(state: Configuration, solution: Solution) -> np.ndarray:
+    """Return the joint torques ``(n,)`` [N·m], the joint rows of H q̈ + C q̇ + G − Σ J_c,iᵀ f_i, thesis (2.2)."""
+    torque = state.M[JOINT_VELOCITY] @ solution.vdot + state.nle[JOINT_VELOCITY]
+    for i in np.flatnonzero(solution.force.any(axis=1)):
+        torque -= state.J_c(i)[:, JOINT_VELOCITY].T @ solution.force[i]
+    return torque

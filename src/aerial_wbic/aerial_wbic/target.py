@@ -1,0 +1,145 @@
+"""What the robot should do now: a plan's sample made whole, or rest over the centre of its support.
+
+Both give the same thing, so that one hierarchy serves take-off, flight, landing and standing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerial_model import plan as plans
+from aerial_model import rotation
+from aerial_model.kinematics import Configuration
+from aerial_model.robot import BASE_ANGULAR, BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY
+from aerial_wbic.blend import Blend
+from aerial_wbic.gains import BodyGains
+
+GRAVITY = np.array([0.0, 0.0, -9.81])  # in W [m/s²]
+GRAVITY.flags.writeable = False
+_WRENCH_REGULARIZATION = 1e-6  # [m²] keeps the share of the load defined when the support is a line or a point
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BodyTarget:
+    """Centre of mass and base attitude, in W, with the gains that hold them there."""
+
+    com: np.ndarray  # (3,) [m]
+    com_velocity: np.ndarray  # (3,) [m/s]
+    com_acceleration: np.ndarray  # (3,) [m/s²]
+    orientation: np.ndarray  # (4,) quaternion xyzw
+    angular_velocity: np.ndarray  # (3,) [rad/s]
+    angular_acceleration: np.ndarray  # (3,) [rad/s²]
+    gains: BodyGains
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WholeBodyTarget:
+    """Everything the hierarchy and the optimization follow in one tick."""
+
+    body: BodyTarget
+    joint_position: np.ndarray  # (n,) [rad]
+    joint_velocity: np.ndarray  # (n,) [rad/s]
+    joint_acceleration: np.ndarray  # (n,) [rad/s²]
+    angular_momentum: np.ndarray  # (3,) [kg·m²/s]
+    angular_momentum_rate: np.ndarray  # (3,) [N·m]
+    force: np.ndarray  # f_cmd (n_c, 3) in W [N]
+    contact: np.ndarray  # (n_c,) bool
+
+
+def from_plan(sample: plans.Target, gains: BodyGains) -> WholeBodyTarget:
+    """Return the target that follows a plan's sample, expressed in W."""
+    R = rotation.matrix(sample.q[BASE_ORIENTATION])
+    body = BodyTarget(
+        com=sample.com,
+        com_velocity=sample.com_velocity,
+        com_acceleration=sample.com_acceleration,
+        orientation=sample.q[BASE_ORIENTATION],
+        angular_velocity=R @ sample.v[BASE_ANGULAR],
+        angular_acceleration=R @ sample.vdot[BASE_ANGULAR],
+        gains=gains,
+    )
+    return WholeBodyTarget(
+        body=body,
+        joint_position=sample.q[JOINT_POSITION],
+        joint_velocity=sample.v[JOINT_VELOCITY],
+        joint_acceleration=sample.vdot[JOINT_VELOCITY],
+        angular_momentum=sample.angular_momentum,
+        angular_momentum_rate=sample.angular_momentum_rate,
+        force=sample.force,
+        contact=sample.contact,
+    )
+
+
+class Hold:
+    """Comes to rest, level, over the centre of the support, and stays there.
+
+    All contact points are taken to be on the ground. The way to rest is a blend of the centre of mass *relative to the
+    centre of its support* and of the attitude, from how the robot moves at the beginning: neither an early nor a late
+    touchdown makes the error jump.
+
+    Args:
+        state: of the robot at the beginning.
+        time: of the beginning [s].
+        duration: to rest [s].
+        com_height: of the centre of mass above the centre of the contact spheres, at rest [m].
+        gains: of the base task.
+    """
+
+    def __init__(self, state: Configuration, time: float, duration: float, com_height: float, gains: BodyGains) -> None:
+        self._gains = gains
+        self._begin = time
+        self.end = time + duration
+        rest = np.array([0.0, 0.0, com_height])
+        self._offset = Blend(state.com - support_centre(state), state.com_velocity, rest, duration)
+        # The attitude as a rotation vector from the level attitude of the present heading.
+        self._level = rotation.about_z(rotation.heading(state.base_orientation))
+        tilt = rotation.log(rotation.multiply(state.base_orientation, rotation.conjugate(self._level)))
+        self._tilt = Blend(tilt, state.R_WB @ state.v[BASE_ANGULAR], np.zeros(3), duration)
+        self._contact = np.ones(state.robot.n_contacts, dtype=bool)
+        self._zeros = np.zeros(state.robot.n_joints)
+
+    def at(self, time: float, state: Configuration) -> WholeBodyTarget:
+        """Return the target at ``time`` [s] of a robot at ``state``."""
+        offset, velocity, acceleration = self._offset.at(time - self._begin)
+        tilt, angular_velocity, angular_acceleration = self._tilt.at(time - self._begin)
+        body = BodyTarget(
+            com=support_centre(state) + offset,
+            com_velocity=velocity,
+            com_acceleration=acceleration,
+            orientation=rotation.multiply(rotation.exp(tilt), self._level),
+            angular_velocity=angular_velocity,
+            angular_acceleration=angular_acceleration,
+            gains=self._gains,
+        )
+        return WholeBodyTarget(
+            body=body,
+            joint_position=state.q[JOINT_POSITION],
+            joint_velocity=self._zeros,
+            joint_acceleration=self._zeros,
+            angular_momentum=state.angular_momentum,
+            angular_momentum_rate=np.zeros(3),
+            force=shared_load(state, acceleration),
+            contact=self._contact,
+        )
+
+
+def support_centre(state: Configuration) -> np.ndarray:
+    """Return the mean of the contact spheres' centres ``(3,)`` [m] in W."""
+    return state.contact_positions.mean(axis=0)
+
+
+def shared_load(state: Configuration, com_acceleration: np.ndarray) -> np.ndarray:
+    """Return forces ``(n_c, 3)`` [N] in W that accelerate the centre of mass and do not turn the body.
+
+    Every point takes a share w_i of the same force F = m (r̈ − g): Σ w_i = 1, and Σ w_i c_i lies where F through the
+    centre of mass meets the height of the support. Of these shares it is the most even one; none is negative.
+    """
+    F = state.robot.mass * (com_acceleration - GRAVITY)
+    arms = state.contact_positions - state.com  # (n_c, 3)
+    A = np.vstack([np.ones(len(arms)), arms[:, :2].T])  # (3, n_c)
+    reach = arms[:, 2].mean() * F[:2] / F[2] if F[2] > 0 else np.zeros(2)
+    b = np.array([1.0, *reach])
+    w = A.T @ np.linalg.solve(A @ A.T + _WRENCH_REGULARIZATION * np.eye(3), b)
+    return np.maximum(w, 0.0)[:, None] * F
