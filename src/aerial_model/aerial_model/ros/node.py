@@ -1,0 +1,127 @@
+"""How a node of Aerial lives: a lifecycle it walks through by itself, diagnostics once a second, a clean end.
+
+A node says what it is in three methods: ``configure``, ``cleanup`` and ``diagnose``; ``main`` runs it as a process.
+"""
+
+from __future__ import annotations
+
+import gc
+import sys
+import traceback
+from collections.abc import Callable
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.executors import ExternalShutdownException
+from rclpy.experimental import EventsExecutor
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.signals import SignalHandlerOptions
+
+from aerial_model.errors import AerialError
+
+_SPIN_TIMEOUT = 0.5  # [s] after which the loop looks whether it shall end
+_DIAGNOSTICS_PERIOD = 1.0  # [s]
+
+
+class AerialNode(LifecycleNode):
+    """A lifecycle node that shares its parameters with all others.
+
+    Parameters: ``robot`` (name or folder), ``autostart`` (false: wait for a lifecycle manager).
+    """
+
+    def __init__(self, name: str, **kwargs: object) -> None:
+        super().__init__(name, **kwargs)
+        self.declare_parameter("robot", "mini_cheetah")
+        self.declare_parameter("autostart", True)
+
+    def configure(self) -> None:
+        """Build what the node works with, what may fail before any interface.
+
+        Raises:
+            AerialError: to stay unconfigured; its sentence goes to the log.
+        """
+
+    def activate(self) -> None:
+        """Begin to act."""
+
+    def deactivate(self) -> None:
+        """Cease to act."""
+
+    def cleanup(self) -> None:
+        """Give back what ``configure`` built, interfaces included."""
+
+    def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
+        """Return level (of ``DiagnosticStatus``), one sentence, and figures, for ``/diagnostics``."""
+        return DiagnosticStatus.OK, "", {}
+
+    def start(self) -> bool:
+        """Configure and activate unless parameter ``autostart`` is false; return whether that worked."""
+        if not self.get_parameter("autostart").value:
+            return True
+        success = TransitionCallbackReturn.SUCCESS
+        return self.trigger_configure() == success and self.trigger_activate() == success
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Build everything, or say in one sentence why that cannot be."""
+        if not self._succeeds(self.configure):
+            return TransitionCallbackReturn.FAILURE
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 1)
+        self._diagnostics_timer = self.create_timer(_DIAGNOSTICS_PERIOD, self._publish_diagnostics)
+        return super().on_configure(state)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Enable the publishers, then act."""
+        result = super().on_activate(state)
+        return result if self._succeeds(self.activate) else TransitionCallbackReturn.FAILURE
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Cease to act, then disable the publishers."""
+        self.deactivate()
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Give everything back."""
+        self.destroy_timer(self._diagnostics_timer)
+        self.destroy_publisher(self._diagnostics)
+        self.cleanup()
+        return super().on_cleanup(state)
+
+    def _succeeds(self, act: Callable[[], None]) -> bool:
+        try:
+            act()
+        except AerialError as error:
+            self.get_logger().fatal(str(error))
+            return False
+        except Exception:  # rclpy would swallow it without a word
+            self.get_logger().fatal(traceback.format_exc())
+            raise
+        return True
+
+    def _publish_diagnostics(self) -> None:
+        level, message, figures = self.diagnose()
+        values = [KeyValue(key=key, value=str(value)) for key, value in figures.items()]
+        status = DiagnosticStatus(
+            level=level, name=self.get_fully_qualified_name(), message=message, hardware_id="", values=values
+        )
+        array = DiagnosticArray(status=[status])
+        array.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(array)
+
+
+def main(make_node: Callable[[], AerialNode]) -> None:
+    """Run a node as a process until SIGINT or SIGTERM; the exit status is 1 if it could not start."""
+    rclpy.init(signal_handler_options=SignalHandlerOptions.ALL)
+    try:
+        node = make_node()
+        executor = EventsExecutor()
+        executor.add_node(node)
+        if not node.start():
+            sys.exit(1)
+        gc.collect()
+        gc.freeze()  # what is there now stays: later collections need not look at it
+        while rclpy.ok():  # EventsExecutor.spin() would busy-wait without serving anything
+            executor.spin_once(timeout_sec=_SPIN_TIMEOUT)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        rclpy.try_shutdown()
