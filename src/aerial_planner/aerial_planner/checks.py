@@ -12,7 +12,7 @@ from aerial_planner.assembly import ActuatorUse
 from aerial_planner.schedule import Schedule
 from aerial_planner.transcription import Solution
 
-VIOLATION_TOLERANCE = 1e-3  # of any constraint of the optimization, SI units
+VIOLATION_TOLERANCE = 1e-4  # of any constraint of the optimization, SI units; a feasible plan may be short of optimal
 ACTUATOR_TOLERANCE = 1.05  # exact torque, voltage or speed over its limit
 ATTITUDE_TOLERANCE = np.deg2rad(3.0)  # of the finely integrated landing attitude [rad]
 RANGE_TOLERANCE = np.deg2rad(3.0)  # by which a joint may leave its planning range in flight [rad]
@@ -57,11 +57,11 @@ def _refuse(reason: str) -> RefusalError:
 
 
 def _check_solution(solution: Solution) -> None:
-    if not solution.converged or solution.max_violation > VIOLATION_TOLERANCE:
+    if solution.max_violation > VIOLATION_TOLERANCE:
         raise RefusalError(
             RefusalCode.NO_SOLUTION,
-            f"no take-off within the limits was found in {solution.iterations} iterations "
-            f"(largest constraint violation {solution.max_violation:.2g})",
+            f"no take-off within the limits was found in {solution.iterations} iterations (largest constraint violation "
+            f"{solution.max_violation:.2g}); what binds: {', '.join(solution.binding[:3]) or 'nothing in particular'}",
         )
 
 

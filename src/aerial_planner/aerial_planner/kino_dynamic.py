@@ -109,18 +109,18 @@ class KinoDynamic:
         rows = Rows()
         R = s.R
         if touching is None:
-            rows.equal(s.x - s.x_0)
+            rows.equal("start", s.x - s.x_0)
         else:
             feet = _world_feet(self.model, s)
             for i in range(n_c):
                 if touching[i]:
-                    rows.equal(feet[:, i] - s.foot_ref[:, i])  # (3.9a)
+                    rows.equal("feet", feet[:, i] - s.foot_ref[:, i])  # (3.9a)
                 elif not loaded[i]:
-                    rows.between(feet[2, i] - s.foot_ref[2, i], 0.0, np.inf)  # (3.10)
-        rows.equal(R.T @ s.alpha - self.model.angular_momentum(s.q_j, s.omega, s.dq_j))  # (3.8)
+                    rows.between("ground", feet[2, i] - s.foot_ref[2, i], 0.0, np.inf)  # (3.10)
+        rows.equal("momentum", R.T @ s.alpha - self.model.angular_momentum(s.q_j, s.omega, s.dq_j))  # (3.8)
         pyramid = friction_pyramid(robot.friction_coefficient)[:4]
         for i in np.flatnonzero(loaded):
-            rows.between(ca.DM(pyramid) @ s.force[i], 0.0, np.inf)  # (3.9b, c)
+            rows.between("friction", ca.DM(pyramid) @ s.force[i], 0.0, np.inf)  # (3.9b, c)
         if self.variant is not Variant.KD:
             self._actuator_rows(rows, s, loaded)
 
@@ -144,9 +144,9 @@ class KinoDynamic:
         for joint in range(robot.n_joints):
             if torque[joint].is_zero():
                 continue
-            rows.between(torque[joint] / law.torque_max[joint], -share, share)  # (3.11b)
+            rows.between(f"{robot.joint_names[joint]} torque", torque[joint] / law.torque_max[joint], -share, share)  # (3.11b)
             volts = law.volts_per_torque[joint] * torque[joint] + law.volts_per_speed[joint] * s.dq_j[joint]
-            rows.between(volts / law.bus_voltage[joint], -share, share)  # (3.11c)
+            rows.between(f"{robot.joint_names[joint]} voltage", volts / law.bus_voltage[joint], -share, share)  # (3.11c)
 
     def _lift_off_kind(self, touching: tuple[bool, ...]) -> StageKind:
         """Return the knot at which the last contact ends: the ballistic path from here ends at the goal."""
@@ -158,12 +158,12 @@ class KinoDynamic:
         rows = Rows()
         feet = _world_feet(self.model, s)
         for i in np.flatnonzero(touching):
-            rows.equal(feet[:, i] - s.foot_ref[:, i])
+            rows.equal("feet", feet[:, i] - s.foot_ref[:, i])
         landing = s.r + s.flight_time * s.rdot - ca.vertcat(0, 0, 0.5 * GRAVITY * s.flight_time**2)
         lead = s.landing_lead * ca.vertcat(s.rdot[:2], 0)
-        rows.equal(landing + lead - s.landing_com)
+        rows.equal("landing position", landing + lead - s.landing_com)
         flight = _FlightSymbols(robot, s.alpha, s.quaternion, s.q_j, s.omega, s.flight_p)
-        rows.equal(flight.momentum_gap(self.model))
+        rows.equal("momentum", flight.momentum_gap(self.model))
         kind = rows.stage("lift_off", s.x, s.u, s.p, self.settings.weights.angular_velocity * ca.sumsqr(s.omega), flight.step())
         self._kinds[key] = kind
         return kind
@@ -176,7 +176,7 @@ class KinoDynamic:
             omega, p = ca.SX.sym("omega", 3), ca.SX.sym("p", _FlightSymbols.n_p(robot))
             flight = _FlightSymbols(robot, alpha, quaternion, q_j, omega, p)
             rows = Rows()
-            rows.equal(flight.momentum_gap(self.model))
+            rows.equal("momentum", flight.momentum_gap(self.model))
             self._kinds[key] = rows.stage("flight", ca.vertcat(alpha, quaternion, q_j), omega, p, self.settings.weights.angular_velocity * ca.sumsqr(omega), flight.step())
         return self._kinds[key]
 

@@ -28,7 +28,8 @@ from aerial_planner.symbolic import base_frame_model
 from aerial_planner.trajectory import TakeOffTrajectory
 from aerial_planner.transcription import Solution, SolverOptions
 
-_CLEARANCE_ATTEMPTS = 4  # each flies higher by what the feet missed
+_ITERATIONS_MAX = 50  # of one solve: those that succeed take 10 to 40
+_ITERATIONS_OF_REQUEST = 70  # after which no further flight is tried, so that a refusal takes no longer than a plan
 _CLEARANCE_SPARE = 0.01  # [m] added to a miss, since the pose at the edge changes with the flight
 
 Progress = Callable[[str, int, float], None]  # stage, iterations so far, residual
@@ -88,7 +89,7 @@ class Planner:
     def __init__(self, robot: Robot, *, solver: str = "fatrop", settings: PlannerSettings | None = None) -> None:
         self.robot = robot
         self.settings = settings or robot.section("planner", PlannerSettings)
-        self.options = SolverOptions(solver=solver)
+        self.options = SolverOptions(solver=solver, max_iterations=_ITERATIONS_MAX)
         self._model = base_frame_model(robot)
         self._ik = InverseKinematics(robot, self._model)
         self._srbm = SingleRigidBody(robot, self._model, self._ik, self.settings, self.options)
@@ -127,7 +128,7 @@ class Planner:
         motion = load_motion(request.motion)
         q_start = self._start_configuration(start)
         extra_rise = 0.0
-        for _ in range(_CLEARANCE_ATTEMPTS):
+        while True:
             schedule = self._schedule(request, motion, extra_rise)
             reference = body_reference(schedule, q_start, self.robot, self._model, self._ik, self.settings)
             screen(request, schedule, reference, self.robot)
@@ -141,11 +142,12 @@ class Planner:
                 progress("checked", clock.iterations, solution.max_violation)
                 report = self._report(request, clock, plan=plan, solution=solution, use=use)
                 return PlanningResult(plan=plan, report=report, actuator_use=use)
-            extra_rise += deficit + _CLEARANCE_SPARE
-        raise RefusalError(
-            RefusalCode.CHECK_FAILED,
-            f"platform edge: a foot would pass {100 * deficit:.1f} cm too low over the terrain, also on a higher flight",
-        )
+            if clock.iterations > _ITERATIONS_OF_REQUEST:
+                raise RefusalError(
+                    RefusalCode.CHECK_FAILED,
+                    f"platform edge: a foot would pass {100 * deficit:.1f} cm too low over the terrain",
+                )
+            extra_rise += deficit + _CLEARANCE_SPARE  # fly higher by what the feet missed
 
     def _guess(
         self, request: MotionRequest, schedule: Schedule, reference: Reference, progress: Progress, clock: _Clock
@@ -161,8 +163,9 @@ class Planner:
         if not solution.converged:
             raise RefusalError(
                 RefusalCode.OUT_OF_REACH,
-                f"out of reach: even a single rigid body with the robot's leg length and friction cannot leave the ground "
-                f"so as to land at {_position(request)} after {schedule.flight_time:.2f} s of flight",
+                f"out of reach: even a single rigid body with the robot's legs cannot leave the ground so as to land at "
+                f"{_position(request)} after {schedule.flight_time:.2f} s of flight; "
+                f"what binds: {', '.join(solution.binding[:3]) or 'nothing in particular'}",
             )
         return guess
 

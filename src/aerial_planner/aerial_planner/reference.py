@@ -13,8 +13,12 @@ from aerial_planner.schedule import GRAVITY, Schedule
 from aerial_planner.settings import PlannerSettings
 from aerial_planner.symbolic import BaseFrameModel
 
-_TUCKED_AT = 0.45  # share of the flight after which the legs are tucked
+_TUCKED_AT = 0.3  # share of the flight after which the legs are tucked: early, as front feet meet a platform's edge first
 _READY_AT = 0.9  # share of the flight after which they are in the landing pose
+_LIFT_OFF_RISE = 0.1  # of the centre of mass above its standing height, as a share of it: the reference's
+_STRETCHED_RISE = 0.25  # the same, at the most: the legs' longest way to the tuck starts here
+_FOLDING_SPEED = 0.55  # share of the no-load speed the legs may take; a short flight tucks less
+_SMOOTH_STEP_PEAK = 1.5  # greatest slope of the smooth step
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,12 +81,13 @@ def body_reference(
 
     landing_com = schedule.landing_centre + [0.0, 0.0, height]
     T = schedule.flight_time
-    lift_off = com_0 + [0.0, 0.0, 0.1 * height]
+    lift_off = com_0 + [0.0, 0.0, _LIFT_OFF_RISE * height]
     velocity = (landing_com - lift_off) / T + [0.0, 0.0, 0.5 * GRAVITY * T]
     lead = settings.landing_lead * np.array([velocity[0], velocity[1], 0.0])
     R_landing = rotation.matrix(schedule.landing_orientation)
     landing_pose = ik.solve((landing_feet + lead @ R_landing)[None], robot.poses["landing"])[0]
 
+    stretched = ik.solve(((feet - com_0 - [0.0, 0.0, _STRETCHED_RISE * height]) @ R)[None], q_j)[0]
     N = len(schedule.contact)
     s = np.linspace(0.0, 1.0, N + 1)[:, None]
     com, com_velocity = _hermite(com_0, lift_off, velocity, schedule.take_off_time, s)
@@ -97,7 +102,7 @@ def body_reference(
         landing_com=landing_com,
         landing_com_height=height,
         landing_joint_position=landing_pose,
-        flight_path=_flight_path(schedule, robot.poses["tuck"], landing_pose),
+        flight_path=_flight_path(schedule, robot, stretched, landing_pose),
     )
 
 
@@ -119,16 +124,26 @@ def _hermite(
     return position, rate
 
 
-def _flight_path(schedule: Schedule, tuck: np.ndarray, landing: np.ndarray) -> FlightPath:
-    M = schedule.flight_knots
+def _flight_path(schedule: Schedule, robot: Robot, stretched: np.ndarray, landing: np.ndarray) -> FlightPath:
+    """Return the path that tucks as far as the legs can fold and stretch in time."""
+    M, dt = schedule.flight_knots, schedule.flight_time / schedule.flight_knots
     turning = max(1, round(_TUCKED_AT * M))
     ready = max(turning + 1, round(_READY_AT * M))
+    travel = _FOLDING_SPEED * robot.actuators.no_load_speed * dt / _SMOOTH_STEP_PEAK  # per interval (n,) [rad]
+    fold = robot.poses["tuck"] - landing
+    depth = 1.0  # of the tuck
+    for way, intervals in ((landing - stretched, turning), (np.zeros_like(landing), ready - turning)):
+        # |way + depth · fold| ≤ travel · intervals, joint by joint
+        room = np.sign(fold) * -way + travel * intervals
+        folding = np.abs(fold) > 0
+        depth = min(depth, *np.clip(room[folding] / np.abs(fold[folding]), 0.0, 1.0), 1.0)
+    tuck = landing + depth * fold
     fraction = np.zeros(M)
     for first, last in ((0, turning), (turning, ready)):
         way, _ = _smooth_step(np.linspace(0.0, 1.0, last - first + 1))
         fraction[first:last] = np.diff(way) / (1 - way[:-1])
     return FlightPath(
-        dt=schedule.flight_time / M, turning=turning, ready=ready, tuck=tuck, landing=landing, fraction=fraction
+        dt=dt, turning=turning, ready=ready, tuck=tuck, landing=landing, fraction=fraction
     )
 
 

@@ -126,12 +126,12 @@ class SingleRigidBody:
 
         rows = Rows()
         if first:
-            rows.equal(s.x - x_0)
+            rows.equal("start", s.x - x_0)
         else:
             self._reach_rows(rows, s, loaded)
         pyramid = friction_pyramid(robot.friction_coefficient)[:4]
         for f in force.values():
-            rows.between(ca.DM(pyramid) @ f, 0.0, np.inf)
+            rows.between("friction", ca.DM(pyramid) @ f, 0.0, np.inf)
         p = ca.vertcat(dt, r_ref, rdot_ref, quaternion_ref, ca.vec(s.foot_ref), x_0)
         self._kinds[key] = rows.stage(f"body_{len(self._kinds)}", s.x, u, p, cost, following)
         return self._kinds[key]
@@ -141,7 +141,7 @@ class SingleRigidBody:
         for i in np.flatnonzero(held):
             leg = s.foot_ref[:, i] - (s.r + s.R @ ca.DM(self.attachment[i]))
             length = self.settings.reach * self.leg_length[i]
-            rows.between(ca.sumsqr(leg) / length**2, -np.inf, 1.0)
+            rows.between("leg length", ca.sumsqr(leg) / length**2, -np.inf, 1.0)
 
     def _lift_off_kind(self, held: tuple[bool, ...]) -> StageKind:
         key = ("lift_off", held)
@@ -150,7 +150,7 @@ class SingleRigidBody:
             dt, T, lead, landing_com = ca.SX.sym("dt"), ca.SX.sym("T"), ca.SX.sym("lead"), ca.SX.sym("goal", 3)
             rows = Rows()
             self._reach_rows(rows, s, held)
-            rows.equal(s.landing_gap(T, lead, landing_com))
+            rows.equal("landing position", s.landing_gap(T, lead, landing_com))
             p = ca.vertcat(dt, T, lead, landing_com, ca.vec(s.foot_ref))
             following = _flight_step(s.alpha, s.quaternion, dt, self.inertia_inverse)
             self._kinds[key] = rows.stage("body_lift_off", s.x, ca.SX(0, 1), p, ca.SX(0), following)

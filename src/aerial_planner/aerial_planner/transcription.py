@@ -11,6 +11,7 @@ same sequence: all numbers enter as stage parameters and bounds.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -20,6 +21,7 @@ import numpy as np
 
 from aerial_planner.symbolic import conjugate, quaternion_product
 
+_ACTIVE = 1e-3  # an inequality nearer to its bound than this holds the optimum back
 _SAME_TURN = 0.5  # least q_goal · q of an attitude that is the goal's
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -38,6 +40,7 @@ class StageKind:
     constraints: ca.SX  # (n_g,)
     lower: np.ndarray  # (n_g,); equal to upper: an equality
     upper: np.ndarray  # (n_g,)
+    labels: tuple[str, ...]  # what each constraint is, for people
 
     @property
     def n_next(self) -> int:
@@ -91,22 +94,24 @@ class Rows:
         self._expressions: list[ca.SX] = []
         self._lower: list[float] = []
         self._upper: list[float] = []
+        self._labels: list[str] = []
 
-    def equal(self, expression: ca.SX) -> None:
+    def equal(self, label: str, expression: ca.SX) -> None:
         """Add expression = 0."""
-        self.between(expression, 0.0, 0.0)
+        self.between(label, expression, 0.0, 0.0)
 
-    def between(self, expression: ca.SX, lower: float, upper: float) -> None:
+    def between(self, label: str, expression: ca.SX, lower: float, upper: float) -> None:
         """Add lower ≤ expression ≤ upper."""
         self._expressions.append(expression)
+        self._labels += [label] * expression.numel()
         self._lower += [lower] * expression.numel()
         self._upper += [upper] * expression.numel()
 
     def attitude(self, quaternion: ca.SX, goal: ca.SX) -> None:
         """Add quaternion = goal, and not its negative: the attitude itself, not the one a full turn away."""
         error = quaternion_product(conjugate(goal), quaternion)
-        self.equal(error[:3])
-        self.between(error[3], _SAME_TURN, np.inf)
+        self.equal("landing attitude", error[:3])
+        self.between("landing attitude", error[3], _SAME_TURN, np.inf)
 
     def stage(self, name: str, x: ca.SX, u: ca.SX, p: ca.SX, cost: ca.SX, next_state: ca.SX | None) -> StageKind:
         """Return the stage kind with these rows as its constraints."""
@@ -120,6 +125,7 @@ class Rows:
             constraints=ca.vertcat(ca.SX(0, 1), *self._expressions),
             lower=np.array(self._lower),
             upper=np.array(self._upper),
+            labels=tuple(self._labels),
         )
 
 
@@ -169,6 +175,7 @@ class Solution:
     status: str
     converged: bool
     max_violation: float  # of any constraint or bound
+    binding: tuple[str, ...]  # the inequalities that hold the optimum back at most knots, most first
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -204,6 +211,8 @@ class Problem:
             excess = np.concatenate([lower_w - w, w - upper_w, lower_g - g, g - upper_g])
         finite = np.all(np.isfinite(w))
         x, u = self._layout.split(w)
+        at_bound = ~self._layout.equality & (np.minimum(g - lower_g, upper_g - g) < _ACTIVE)
+        active = Counter(label for label, hit in zip(self._layout.labels, at_bound, strict=True) if hit)
         return Solution(
             x=x,
             u=u,
@@ -212,6 +221,7 @@ class Problem:
             status=str(stats.get("return_status", stats.get("unified_return_status", ""))),
             converged=bool(stats["success"]) and finite,
             max_violation=float(np.max(excess, initial=0.0)) if finite else float("inf"),
+            binding=tuple(label for label, _ in active.most_common()),
         )
 
     def _build(self) -> ca.Function:
@@ -279,6 +289,7 @@ class _Layout:
         self.lower = np.concatenate([np.concatenate([zero, low]) for zero, low, _ in rows])
         self.upper = np.concatenate([np.concatenate([zero, up]) for zero, _, up in rows])
         self.equality = self.lower == self.upper
+        self.labels = [label for kind in self.kinds for label in ("dynamics",) * kind.n_next + kind.labels]
 
     def split(self, w: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
         """Return the states and the controls of each knot."""
