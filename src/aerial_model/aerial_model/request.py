@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from aerial_model import rotation
 from aerial_model.config import frozen_array
-from aerial_model.terrain import Terrain
+from aerial_model.errors import ConfigurationError
+from aerial_model.robot import Robot
+from aerial_model.terrain import HURDLE_THICKNESS, PLATFORM_LENGTH, Terrain
+
+UPPER_MARGIN = 0.08  # of the feet on the platform from its edge [m]: more than the least, for landings off the goal
+LOWER_MARGIN = 0.03  # of the feet below it from its edge [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,3 +34,74 @@ class MotionRequest:
         object.__setattr__(self, "displacement", frozen_array(self.displacement, "displacement", (3,)))
         if not np.isfinite(self.yaw) or not np.isfinite(self.rotation or 0.0):
             raise ValueError("yaw and rotation must be finite numbers")
+
+    @property
+    def direction(self) -> float:
+        """Angle of the jump from x [rad]; forward for a jump on the spot."""
+        return float(np.arctan2(self.displacement[1], self.displacement[0]))
+
+    def with_platform(self, robot: Robot, height: float | None = None, edge: float | None = None) -> MotionRequest:
+        """Return this request with a platform along the jump.
+
+        Args:
+            robot: whose feet must fit.
+            height: of the platform above the start [m], negative for a step down; None: the goal's.
+            edge: distance to the edge to jump over [m]; None: where the feet fit best.
+
+        Raises:
+            ConfigurationError: if the height is 0 or not finite.
+        """
+        height = float(self.displacement[2]) if height is None else height
+        if height == 0 or not np.isfinite(height):
+            raise ConfigurationError(f"platform: expected a height other than 0, found {height}")
+        if edge is None:
+            edge = self._platform_edge(robot, down=height < 0)
+        return self._on(Terrain.platform(height, edge, self.direction))
+
+    def with_hurdle(self, robot: Robot, height: float, edge: float | None = None) -> MotionRequest:
+        """Return this request with a thin bar across the jump.
+
+        Args:
+            robot: whose feet must fit.
+            height: of the bar [m].
+            edge: distance to its near face [m]; None: midway between standing and landing feet.
+
+        Raises:
+            ConfigurationError: if the height is not a positive number.
+        """
+        if not 0 < height < np.inf:
+            raise ConfigurationError(f"hurdle: expected a positive height, found {height}")
+        if edge is None:
+            edge = float(np.mean([self._standing_feet(robot)[1], self._landing_feet(robot)[0]])) - HURDLE_THICKNESS / 2
+        return self._on(Terrain.hurdle(height, edge, self.direction))
+
+    def _on(self, terrain: Terrain) -> MotionRequest:
+        boxes = self.terrain.boxes + terrain.boxes
+        return dataclasses.replace(self, terrain=Terrain(boxes=boxes))
+
+    def _platform_edge(self, robot: Robot, *, down: bool) -> float:
+        """Return the distance [m] of the edge to jump over.
+
+        The feet on the platform keep ``UPPER_MARGIN`` and those below it at least ``LOWER_MARGIN``; where both cannot be,
+        the edge is halfway between. Flying feet clear an edge the more easily the nearer it is to the upper feet.
+        """
+        (rear_standing, front_standing), (rear_landing, front_landing) = self._standing_feet(robot), self._landing_feet(robot)
+        if down:
+            nearest, farthest = front_standing + UPPER_MARGIN, rear_landing - LOWER_MARGIN
+            edge = nearest if nearest <= farthest else (nearest + farthest) / 2
+            return min(edge, rear_standing - UPPER_MARGIN + PLATFORM_LENGTH)
+        nearest, farthest = front_standing + LOWER_MARGIN, rear_landing - UPPER_MARGIN
+        edge = farthest if nearest <= farthest else (nearest + farthest) / 2
+        return max(edge, front_landing + UPPER_MARGIN - PLATFORM_LENGTH)
+
+    def _standing_feet(self, robot: Robot) -> tuple[float, float]:
+        return self._extent(robot.contact_positions(robot.standing_configuration()))
+
+    def _landing_feet(self, robot: Robot) -> tuple[float, float]:
+        feet = robot.contact_positions(robot.standing_configuration("landing"))
+        return self._extent(self.displacement + feet @ rotation.matrix(rotation.about_z(self.yaw)).T)
+
+    def _extent(self, feet: np.ndarray) -> tuple[float, float]:
+        """Return the least and the greatest coordinate of points ``(n, 3)`` along the jump [m]."""
+        along = feet[:, :2] @ np.array([np.cos(self.direction), np.sin(self.direction)])
+        return float(along.min()), float(along.max())

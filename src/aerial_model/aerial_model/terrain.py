@@ -15,6 +15,8 @@ from aerial_model.config import frozen_array
 
 PLATFORM_LENGTH = 0.9  # [m] along the jump: a stance and room to land off the goal
 PLATFORM_WIDTH = 0.9  # [m]
+HURDLE_THICKNESS = 0.03  # [m]
+HURDLE_WIDTH = 0.9  # [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +69,22 @@ class Terrain:
         """
         middle = edge + PLATFORM_LENGTH / 2 if height > 0 else edge - PLATFORM_LENGTH / 2
         centre = np.array([middle * np.cos(direction), middle * np.sin(direction), height / 2])
-        return Terrain(boxes=(Box(centre=centre, size=np.array([PLATFORM_LENGTH, PLATFORM_WIDTH, abs(height)]), yaw=direction),))
+        return Terrain(
+            boxes=(Box(centre=centre, size=np.array([PLATFORM_LENGTH, PLATFORM_WIDTH, abs(height)]), yaw=direction),)
+        )
+
+    @staticmethod
+    def hurdle(height: float, edge: float, direction: float) -> Terrain:
+        """Return a thin bar on the ground, across the jump.
+
+        Args:
+            height: of the bar [m].
+            edge: distance from the origin, along the jump, to the bar's near face [m].
+            direction: of the jump, angle from x [rad].
+        """
+        middle = edge + HURDLE_THICKNESS / 2
+        centre = np.array([middle * np.cos(direction), middle * np.sin(direction), height / 2])
+        return Terrain(boxes=(Box(centre=centre, size=np.array([HURDLE_THICKNESS, HURDLE_WIDTH, height]), yaw=direction),))
 
     @property
     def floor(self) -> float:
