@@ -1,6 +1,7 @@
 """The judge, on made-up histories: a perfect one passes, and each check has one that fails it and nothing else."""
 
 import dataclasses
+import json
 
 import numpy as np
 import pinocchio as pin
@@ -118,8 +119,8 @@ def test_a_perfect_history_has_landed(verdict, ticks):
     assert result.failed == ()
 
 
-def test_figures_of_a_perfect_history(verdict, ticks, robot):
-    result = verdict(ticks).to_json()
+def test_figures_of_a_perfect_history(verdict, ticks):
+    result = json.loads(json.dumps(verdict(ticks).to_json()))
     assert result["tilt_deg"] == pytest.approx(0.0, abs=1e-5)
     assert result["position_error_m"] == pytest.approx(0.0, abs=1e-9)
     assert result["rotation_deg"] == pytest.approx([0.0, 0.0, np.degrees(TURN)], abs=0.1)
@@ -236,7 +237,11 @@ def test_one_fallback_fails_no_fallback_alone(verdict, ticks):
 def test_what_happens_before_or_after_does_not_count(verdict, ticks):
     bad = {"trunk_contact": True, "peak_torque_ratio": 5.0}
     before = [dataclasses.replace(ticks[0], truth=dataclasses.replace(ticks[0].truth, time=START - DT, **bad))]
-    after = [dataclasses.replace(ticks[-1], truth=dataclasses.replace(ticks[-1].truth, time=ticks[-1].truth.time + DT, **bad))]
+    after = [
+        dataclasses.replace(
+            ticks[-1], truth=dataclasses.replace(ticks[-1].truth, time=ticks[-1].truth.time + DT, **bad)
+        )
+    ]
     result = verdict(before + ticks + after)
     assert result.landed
     assert result.peak_torque_ratio == 0.9

@@ -35,9 +35,9 @@ def random_state(request, robot):
     """q, v, joint torque: within the joint stops, far above the floor."""
     random = np.random.default_rng(request.param)
     model = robot.model
-    q = pin.randomConfiguration(model, -np.ones(model.nq), np.ones(model.nq))
-    q[:3] = random.uniform(-1, 1, 3) + [0, 0, 5]
-    q[BASE_ORIENTATION] = pin.Quaternion(*_unit(random)).coeffs()
+    q = np.empty(model.nq)
+    q[:3] = random.uniform([-1, -1, 4], [1, 1, 6])
+    q[BASE_ORIENTATION] = _unit(random)
     q[JOINT_POSITION] = random.uniform(model.lowerPositionLimit[7:], model.upperPositionLimit[7:])
     v = random.normal(0, 3, model.nv)
     return q, v, random.uniform(-1, 1, robot.n_joints) * robot.actuators.torque_max

@@ -72,7 +72,10 @@ def test_without_noise_sensors_tell_the_truth(robot, attitude):
 
 def test_bias_signs_differ_from_seed_to_seed(robot):
     noise = SensorNoise()
-    draws = {tuple(Sensors(noise, JOINTS, np.random.default_rng(seed)).joint_position(np.zeros(JOINTS))) for seed in range(20)}
+    draws = {
+        tuple(Sensors(noise, JOINTS, np.random.default_rng(seed)).joint_position(np.zeros(JOINTS)))
+        for seed in range(20)
+    }
     assert len(draws) == 20
 
 

@@ -78,7 +78,9 @@ class Landing:
         }
 
 
-def judge(robot: Robot, plan: Plan, *, origin: np.ndarray, heading: float, start_time: float, ticks: list[Tick]) -> Landing:
+def judge(
+    robot: Robot, plan: Plan, *, origin: np.ndarray, heading: float, start_time: float, ticks: list[Tick]
+) -> Landing:
     """Return the verdict on one motion.
 
     Args:
@@ -113,19 +115,20 @@ def judge(robot: Robot, plan: Plan, *, origin: np.ndarray, heading: float, start
     tilt = rotation.tilt(final.q[BASE_ORIENTATION])
     rotation_error = float(np.linalg.norm(turned - placed.rotation))
     beyond = [max(truth.peak_torque_ratio, truth.peak_voltage_ratio) > 1 for truth in truths]
+    checks = {
+        "airborne": airborne * period >= AIRBORNE_FRACTION * (plan.landing_time - plan.take_off_time),
+        "trunk_clear": not any(truth.trunk_contact for truth in truths),
+        "feet_only": not any(truth.other_contacts for truth in settled),
+        "upright": tilt <= TILT_MAX,
+        "height": abs(height - plan.landing_com_height) <= HEIGHT_TOLERANCE * plan.landing_com_height,
+        "at_rest": np.linalg.norm(final.v[BASE_LINEAR]) <= SPEED_MAX,
+        "rotation": rotation_error <= ROTATION_TOLERANCE,
+        "position": position_error <= position_tolerance,
+        "within_limits": np.mean(beyond) <= SATURATED_FRACTION,
+        "no_fallback": not any(tick.fallback for tick in ticks),
+    }
     return Landing(
-        checks={
-            "airborne": airborne * period >= AIRBORNE_FRACTION * (plan.landing_time - plan.take_off_time),
-            "trunk_clear": not any(truth.trunk_contact for truth in truths),
-            "feet_only": not any(truth.other_contacts for truth in settled),
-            "upright": tilt <= TILT_MAX,
-            "height": abs(height - plan.landing_com_height) <= HEIGHT_TOLERANCE * plan.landing_com_height,
-            "at_rest": bool(np.linalg.norm(final.v[BASE_LINEAR]) <= SPEED_MAX),
-            "rotation": rotation_error <= ROTATION_TOLERANCE,
-            "position": position_error <= position_tolerance,
-            "within_limits": bool(np.mean(beyond) <= SATURATED_FRACTION),
-            "no_fallback": not any(tick.fallback for tick in ticks),
-        },
+        checks={name: bool(holds) for name, holds in checks.items()},
         tilt=tilt,
         height=height,
         position_error=position_error,
@@ -142,7 +145,9 @@ def _window(ticks: list[Tick], start: float, end: float) -> tuple[list[Tick], fl
     first, last = ticks[0].truth.time, ticks[-1].truth.time
     period = (last - first) / max(len(ticks) - 1, 1)
     if first > start + period or last < end - period:
-        raise ValueError(f"a landing is judged from {start:.3f} s to {end:.3f} s; ticks cover {first:.3f} s to {last:.3f} s")
+        raise ValueError(
+            f"a landing is judged from {start:.3f} s to {end:.3f} s; ticks cover {first:.3f} s to {last:.3f} s"
+        )
     return [tick for tick in ticks if start - period / 2 <= tick.truth.time <= end + period / 2], period
 
 

@@ -1,8 +1,8 @@
 """The robot's stand-in: torque commands in, measurements out, the actuator law between, MuJoCo below.
 
-One ``step`` is one control period. Within it the drives close their own loop at every physics step, as motor boards do:
-set-point to requested torque, the actuator law to delivered torque, MuJoCo to motion. Equal seeds and equal commands give
-equal measurements to the last bit.
+One ``step`` is one control period. Within it the drives close their own loop at every physics step, as motor boards
+do: set-point to requested torque, the actuator law to delivered torque, MuJoCo to motion. Equal seeds and equal
+commands give equal measurements to the last bit.
 """
 
 from __future__ import annotations
@@ -27,12 +27,11 @@ from aerial_sim.contacts import ContactSensing
 from aerial_sim.drive import Drive
 from aerial_sim.ground_truth import GroundTruth
 from aerial_sim.sensors import SensorNoise, Sensors
-from aerial_sim.world import FRICTION_COEFFICIENT, World, build
+from aerial_sim.world import FRICTION_COEFFICIENT, XYZW, World, build
 
 PHYSICS_DT = 0.0005  # [s]
 CONTROL_DT = 0.002  # [s]
 FLAT = Terrain()
-XYZW = [4, 5, 6, 3]  # the base quaternion in qpos, where MuJoCo has w first
 START_OFFSET = np.radians(1.0)  # largest error of the joints' starting positions with noise [rad]
 
 
@@ -195,9 +194,7 @@ class Simulation:
     def set_state(self, q: np.ndarray, v: np.ndarray) -> None:
         """Put the robot at q ``(nq,)`` and v ``(nv,)`` in Pinocchio's order; time goes on."""
         data = self._data
-        data.qpos[BASE_POSITION] = q[BASE_POSITION]
-        data.qpos[XYZW] = q[BASE_ORIENTATION]
-        data.qpos[self._world.joint_qpos] = q[JOINT_POSITION]
+        data.qpos[:] = self._world.qpos(q)
         data.qvel[BASE_LINEAR] = self._R_WB() @ v[BASE_LINEAR]
         data.qvel[BASE_ANGULAR] = v[BASE_ANGULAR]
         data.qvel[self._world.joint_dof] = v[JOINT_VELOCITY]

@@ -21,19 +21,21 @@ import mujoco
 import numpy as np
 
 from aerial_model.errors import ConfigurationError
-from aerial_model.robot import Robot
+from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, JOINT_POSITION, Robot
 from aerial_model.rotation import about_z
 from aerial_model.terrain import Terrain
-from aerial_sim import scenery
 
 FRICTION_COEFFICIENT = 0.7  # of the world; planner and controller count on less, see robot.yaml
 IMPEDANCE = (0.95, 0.99, 0.001, 0.5, 2.0)  # MuJoCo's solimp of ground, stops and dry friction
 IMPEDANCE_RATIO = 100.0  # friction over normal stiffness
 STEPS_PER_TIME_CONSTANT = 2.0  # the stiffest contact MuJoCo keeps stable
 SOLVER_TOLERANCE = 1e-10
+XYZW = [4, 5, 6, 3]  # the base quaternion in qpos, where MuJoCo has w first
 WORLD_BODY = 0  # MuJoCo's id of the body all terrain belongs to
 ROBOT_SHAPE_GROUP = 3  # MuJoCo draws groups 0 to 2 unless told otherwise
 ROBOT_LOOKS_GROUP = 2
+FLOOR_COLOUR = (0.94, 0.94, 0.93, 1.0)
+BOX_COLOUR = (0.42, 0.56, 0.68, 1.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,6 +49,14 @@ class World:
     contact_geoms: np.ndarray  # (n_c,) id of each contact point's sphere
     trunk: int  # id of the robot's root body
     ground_geoms: np.ndarray  # ids of floor and boxes
+
+    def qpos(self, q: np.ndarray) -> np.ndarray:
+        """Return MuJoCo's qpos ``(nq,)`` of a configuration q ``(nq,)`` in Pinocchio's order."""
+        qpos = np.empty_like(q)
+        qpos[BASE_POSITION] = q[BASE_POSITION]
+        qpos[XYZW] = q[BASE_ORIENTATION]
+        qpos[self.joint_qpos] = q[JOINT_POSITION]
+        return qpos
 
 
 def build(robot: Robot, terrain: Terrain, physics_dt: float) -> World:
@@ -64,7 +74,6 @@ def build(robot: Robot, terrain: Terrain, physics_dt: float) -> World:
         _set_shapes(spec)
         contact_names = _add_contact_points(spec, robot)
         ground_names = _add_ground(spec, terrain, physics_dt)
-        scenery.add(spec)
         trunk_name = root.name
         model = spec.compile()
     except (ValueError, RuntimeError) as error:
@@ -149,7 +158,7 @@ def _add_ground(spec: mujoco.MjSpec, terrain: Terrain, physics_dt: float) -> lis
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         pos=[0, 0, terrain.floor],
         size=[0, 0, 1],  # infinite
-        material=scenery.FLOOR_MATERIAL,
+        rgba=FLOOR_COLOUR,
         **surface,
     )
     for i, box in enumerate(terrain.boxes):
@@ -161,7 +170,7 @@ def _add_ground(spec: mujoco.MjSpec, terrain: Terrain, physics_dt: float) -> lis
             pos=box.centre,
             quat=[w, x, y, z],
             size=box.size / 2,
-            material=scenery.BOX_MATERIAL,
+            rgba=BOX_COLOUR,
             **surface,
         )
     return names
