@@ -1,4 +1,3 @@
-import matplotlib.image
 import numpy as np
 import pytest
 from PIL import Image
@@ -88,7 +87,8 @@ def test_pictures_and_animations_are_written(robot, tmp_path):
     motion = footage(robot, np.zeros(3), 0.0)
     save(strobe(motion, WIDTH, HEIGHT, samples=1), tmp_path / "strobe.png")
     save_animation(frames(motion, 5.0, WIDTH, HEIGHT, samples=1), 5.0, tmp_path / "motion.gif")
-    assert matplotlib.image.imread(tmp_path / "strobe.png").shape[:2] == (HEIGHT, WIDTH)
+    with Image.open(tmp_path / "strobe.png") as picture:
+        assert picture.size == (WIDTH, HEIGHT)
     with Image.open(tmp_path / "motion.gif") as animation:
         assert animation.n_frames > 1  # equal ones are joined
         assert animation.size == (WIDTH, HEIGHT)

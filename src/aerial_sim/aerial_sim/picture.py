@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import matplotlib.image
 import numpy as np
 import pinocchio as pin
 from PIL import Image
@@ -123,13 +122,17 @@ def frames(
 
 def save(image: np.ndarray, path: Path) -> None:
     """Write a picture ``(height, width, 3)``, 0 … 1, as a PNG file."""
-    matplotlib.image.imsave(path, image, format="png")
+    _bytes(image).save(path, format="PNG")
 
 
 def save_animation(images: Iterator[np.ndarray], rate: float, path: Path) -> None:
     """Write pictures, 0 … 1, as an endless GIF that shows ``rate`` [1/s] of them."""
-    first, *rest = [Image.fromarray((255 * image).round().astype(np.uint8)) for image in images]
+    first, *rest = [_bytes(image) for image in images]
     first.save(path, format="GIF", save_all=True, append_images=rest, duration=round(1000 / rate), loop=0)
+
+
+def _bytes(image: np.ndarray) -> Image.Image:
+    return Image.fromarray((255 * image).round().astype(np.uint8))
 
 
 def _camera(footage: Footage, poses: np.ndarray, aspect: float) -> Camera:
