@@ -36,7 +36,7 @@ def integrate_flight(
     joint_velocity: np.ndarray,
     step: float = _STEP,
 ) -> Flight:
-    """Return the flight from a take-off state, by a fourth-order Runge–Kutta rule.
+    """Return the flight from a take-off state, by the classical Runge–Kutta rule on the quaternion.
 
     The legs follow ``path``; the joint rates they leave the ground with fade out on top of it, as no motor stops at once.
 
@@ -62,21 +62,22 @@ def integrate_flight(
     def rate(i: int, quaternion: np.ndarray) -> np.ndarray:
         return inertia_inverse[i] @ (rotation.matrix(quaternion).T @ angular_momentum - legs_momentum[i])
 
-    attitudes, rates = [np.asarray(orientation)], [rate(0, orientation)]
+    def slope(i: int, quaternion: np.ndarray) -> np.ndarray:
+        return 0.5 * rotation.multiply(quaternion, np.append(rate(i, quaternion / np.linalg.norm(quaternion)), 0.0))
+
+    attitudes = [np.asarray(orientation)]
     for k in range(n):
-        start, i = attitudes[-1], 2 * k
-        w_1 = rates[-1]
-        w_2 = rate(i + 1, rotation.multiply(start, rotation.exp(0.5 * h * w_1)))
-        w_3 = rate(i + 1, rotation.multiply(start, rotation.exp(0.5 * h * w_2)))
-        w_4 = rate(i + 2, rotation.multiply(start, rotation.exp(h * w_3)))
-        mean = (w_1 + 2 * w_2 + 2 * w_3 + w_4) / 6
-        end = rotation.multiply(start, rotation.exp(h * mean))
-        attitudes.append(end / np.linalg.norm(end))
-        rates.append(rate(i + 2, attitudes[-1]))
+        q, i = attitudes[-1], 2 * k
+        k_1 = slope(i, q)
+        k_2 = slope(i + 1, q + 0.5 * h * k_1)
+        k_3 = slope(i + 1, q + 0.5 * h * k_2)
+        k_4 = slope(i + 2, q + h * k_3)
+        q = q + h / 6 * (k_1 + 2 * k_2 + 2 * k_3 + k_4)
+        attitudes.append(q / np.linalg.norm(q))
     return Flight(
         time=half_times[::2],
         orientation=np.array(attitudes),
-        angular_velocity=np.array(rates),
+        angular_velocity=np.array([rate(2 * k, attitudes[k]) for k in range(n + 1)]),
         joint_position=q_j[::2],
         joint_velocity=dq_j[::2],
     )

@@ -333,7 +333,10 @@ class _Layout:
             x_next = w[int(self.z_0[k + 1]) : int(self.z_0[k + 1]) + kind.n_next]
             at_row, at_column = self.row_0[k : k + 1], self.z_0[k + 1 : k + 2]
             g += [_Blocks(ca.Sparsity.dense(kind.n_next, 1), x_next, at_row, np.zeros(1, dtype=int))]
-            jacobian += [_Blocks(ca.Sparsity.diag(kind.n_next), ca.MX.ones(kind.n_next), at_row, at_column)]
+            jacobian += [_Blocks(ca.Sparsity.diag(kind.n_next), ca.MX.eye(kind.n_next), at_row, at_column)]
+            lam_x = lam_g[int(self.row_0[k]) : int(self.row_0[k]) + kind.n_next]
+            to_rows = self.z_0[k + 1 : k + 2]
+            lagrangian_gradient += [_Blocks(ca.Sparsity.dense(kind.n_next, 1), lam_x, to_rows, np.zeros(1, dtype=int))]
         g_all = _assembled(g, n_g, 1)
         grad_f, H_all = _assembled(gradient, n_w, 1), _assembled(hessian, n_w, n_w)
         outputs = {
@@ -368,6 +371,8 @@ class _Blocks:
 
 def _gather(vector: ca.MX, starts: np.ndarray, n: int) -> ca.MX:
     """Return ``(n, len(starts))``: the n entries from each start, as columns."""
+    if n == 0:
+        return ca.MX(0, len(starts))
     indices = (np.asarray(starts)[:, None] + np.arange(n)).ravel().tolist()
     return ca.reshape(vector[indices], n, len(starts))
 
@@ -376,10 +381,15 @@ def _assembled(blocks: Sequence[_Blocks], n_rows: int, n_columns: int) -> ca.MX:
     """Return the sparse matrix that holds all blocks; entries that several blocks share are added."""
     rows, columns, values = [], [], []
     for block in blocks:
+        if block.sparsity.nnz() == 0:
+            continue
         rows.append((block.row_0[:, None] + np.array(block.sparsity.row(), dtype=int)).ravel())
         columns.append((block.column_0[:, None] + np.array(block.sparsity.get_col(), dtype=int)).ravel())
-        values.append(ca.vec(block.values).nz[:])
-    rows, columns = np.concatenate(rows).astype(int), np.concatenate(columns).astype(int)
+        side_by_side = ca.repmat(block.sparsity, 1, len(block.row_0))
+        values.append(ca.vec(ca.project(block.values, side_by_side)).nz[:])
+    if not values:
+        return ca.MX(n_rows, n_columns)
+    rows, columns = np.concatenate(rows), np.concatenate(columns)
     nonzeros = ca.vertcat(*values)
     order = np.lexsort((rows, columns))
     keys = columns[order] * n_rows + rows[order]

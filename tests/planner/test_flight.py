@@ -1,0 +1,68 @@
+"""The finely integrated flight against MuJoCo-free truths: momentum, a known spin, and its own convergence."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from aerial_model import rotation
+from aerial_planner.flight import integrate_flight
+from aerial_planner.reference import FlightPath
+from aerial_planner.symbolic import base_frame_model
+
+T = 0.4  # [s]
+
+
+@pytest.fixture(scope="module")
+def model(robot):
+    return base_frame_model(robot)
+
+
+def path(robot, tuck="tuck"):
+    M = 16
+    return FlightPath(
+        dt=T / M, turning=5, ready=14, tuck=robot.poses[tuck], landing=robot.poses["landing"], fraction=np.zeros(M)
+    )
+
+
+def fly(robot, model, alpha, *, tuck="tuck", step=0.005, rate=0.0):
+    return integrate_flight(
+        model,
+        path(robot, tuck),
+        orientation=rotation.exp(np.array([0.1, -0.2, 0.3])),
+        angular_momentum=np.array(alpha),
+        joint_position=robot.poses["home"],
+        joint_velocity=np.full(12, rate),
+        step=step,
+    )
+
+
+def test_angular_momentum_is_conserved_while_the_legs_move(robot, model):
+    alpha = np.array([0.3, 1.0, -0.5])
+    flight = fly(robot, model, alpha, rate=2.0)
+    data = robot.model.createData()
+    for k in range(len(flight.time)):
+        q = np.concatenate([np.zeros(3), flight.orientation[k], flight.joint_position[k]])
+        v = np.concatenate([np.zeros(3), flight.angular_velocity[k], flight.joint_velocity[k]])
+        h = pin.computeCentroidalMomentum(robot.model, data, q, v)
+        np.testing.assert_allclose(h.angular, alpha, atol=1e-9)
+
+
+def test_halving_the_step_changes_the_landing_attitude_by_nothing_that_matters(robot, model):
+    coarse, fine = (fly(robot, model, [0.5, 2.5, 0.3], step=step) for step in (0.01, 0.0025))
+    miss = rotation.log(rotation.multiply(rotation.conjugate(fine.orientation[-1]), coarse.orientation[-1]))
+    assert np.rad2deg(np.linalg.norm(miss)) < 0.03
+
+
+def test_still_legs_and_no_momentum_leave_the_attitude_alone(robot, model):
+    flight = fly(robot, model, [0.0, 0.0, 0.0], tuck="home")
+    np.testing.assert_allclose(flight.orientation, np.tile(flight.orientation[0], (len(flight.time), 1)), atol=1e-12)
+
+
+def test_joint_rates_are_the_derivative_of_the_path(robot, model):
+    flight = fly(robot, model, [0.0, 0.0, 0.0], rate=3.0, step=1e-4)
+    numeric = np.gradient(flight.joint_position, flight.time, axis=0)
+    np.testing.assert_allclose(flight.joint_velocity[2:-2], numeric[2:-2], atol=0.05)
+
+
+def test_the_flight_ends_in_the_landing_pose(robot, model):
+    np.testing.assert_allclose(fly(robot, model, [0, 0, 0], rate=3.0).joint_position[-1], robot.poses["landing"], atol=1e-9)

@@ -1,0 +1,205 @@
+"""Plans against physics: what is checked here is recomputed from the plan alone."""
+
+import dataclasses
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from aerial_model import rotation
+from aerial_model.contact import friction_pyramid
+from aerial_model.errors import InvalidPlanError, RefusalCode, RefusalError
+from aerial_model.request import MotionRequest
+from aerial_model.robot import BASE_ORIENTATION
+from aerial_model.state import Estimate
+from aerial_model.terrain import Terrain
+from aerial_planner.planner import Planner
+
+from .conftest import jump
+
+G = np.array([0.0, 0.0, -9.81])
+POSITION_TOLERANCE = 1e-4  # [m]
+MOMENTUM_TOLERANCE = 1e-4  # [kg·m²/s]
+REFUSAL_TIME = 2.0  # [s] that a refusal may take
+
+GOALS = [
+    ("forward", jump(0.3, 0.0)),
+    ("far forward", jump(1.0, 0.0)),
+    ("backward", jump(-0.2, 0.0)),
+    ("left", jump(0.0, 0.2)),
+    ("right", jump(0.0, -0.4)),
+    ("oblique", jump(-0.3, 0.3)),
+    ("up", jump(0.0, 0.0)),
+    ("turning", jump(0.2, 0.1, yaw=0.8)),
+    ("quarter turn", jump(0.0, 0.0, yaw=-np.pi / 2)),
+    ("onto a platform", jump(0.6, 0.0, 0.16, terrain=Terrain.platform(0.16, 0.3, 0.0))),
+    ("off a platform", jump(0.6, 0.0, -0.16, terrain=Terrain.platform(-0.16, 0.3, 0.0))),
+]
+
+
+@pytest.fixture(scope="module", params=GOALS, ids=lambda goal: goal[0])
+def case(request, planner):
+    wanted = request.param[1]
+    return wanted, planner.plan(wanted)
+
+
+def test_a_plan_is_consistent_and_for_this_robot(case, robot):
+    case[1].plan.checked(robot)
+
+
+def test_the_ballistic_path_ends_over_the_goal(case):
+    wanted, result = case
+    plan = result.plan
+    k = np.searchsorted(plan.time, plan.take_off_time - 1e-9)
+    T = plan.landing_time - plan.take_off_time
+    landing = plan.com[k] + plan.com_velocity[k] * T + 0.5 * G * T**2
+    lead = 0.05 * plan.com_velocity[k, :2]
+    np.testing.assert_allclose(landing[:2] + lead, wanted.displacement[:2], atol=POSITION_TOLERANCE)
+    assert landing[2] - wanted.displacement[2] == pytest.approx(plan.landing_com_height, abs=POSITION_TOLERANCE)
+
+
+def test_the_landing_feet_stand_on_the_landing_surface(case):
+    wanted, result = case
+    heights = result.plan.foot_position[-1, :, 2] - 0.004
+    np.testing.assert_allclose(heights, wanted.displacement[2], atol=5e-3)
+
+
+def test_forces_move_the_centre_of_mass_and_its_momentum_as_planned(case, robot):
+    plan = case[1].plan
+    for k in range(np.searchsorted(plan.time, plan.take_off_time - 1e-9)):
+        dt = plan.time[k + 1] - plan.time[k]
+        force = plan.force[k].sum(axis=0)
+        moment = np.cross(plan.foot_position[k] - plan.com[k], plan.force[k]).sum(axis=0)
+        v = plan.com_velocity[k] + (force / robot.mass + G) * dt
+        np.testing.assert_allclose(plan.com_velocity[k + 1], v, atol=POSITION_TOLERANCE)
+        np.testing.assert_allclose(plan.angular_momentum[k + 1], plan.angular_momentum[k] + moment * dt, atol=MOMENTUM_TOLERANCE)
+
+
+def test_forces_stay_in_the_friction_pyramid(case, robot):
+    plan = case[1].plan
+    W = friction_pyramid(robot.friction_coefficient)
+    assert np.min(plan.force @ W.T) > -1e-3
+    assert np.all(plan.force[~plan.contact] == 0.0)
+
+
+def test_feet_in_contact_do_not_move(case):
+    plan = case[1].plan
+    held = np.repeat(plan.contact[:, :, None], 3, axis=2)
+    drift = np.where(held, plan.foot_position - plan.foot_position[0], 0.0)
+    assert np.abs(drift).max() < POSITION_TOLERANCE
+
+
+def test_velocities_carry_the_planned_momentum(case, robot):
+    plan = case[1].plan
+    data = robot.model.createData()
+    for q, v, com_velocity, alpha in zip(plan.q, plan.v, plan.com_velocity, plan.angular_momentum, strict=True):
+        h = pin.computeCentroidalMomentum(robot.model, data, q, v)
+        np.testing.assert_allclose(h.linear, robot.mass * com_velocity, atol=1e-6)
+        np.testing.assert_allclose(h.angular, alpha, atol=1e-6)
+
+
+def test_the_robot_lands_level_at_the_goal_heading(case):
+    wanted, result = case
+    miss = rotation.multiply(rotation.about_z(-wanted.yaw), result.plan.q[-1, BASE_ORIENTATION])
+    assert np.rad2deg(np.linalg.norm(rotation.log(miss))) < 3.0
+    assert result.report.rotation_deg[2] == pytest.approx(np.rad2deg(wanted.yaw), abs=5.0)
+
+
+def test_exact_torques_are_within_the_limits(case):
+    report = case[1].report
+    assert report.peak_torque_ratio <= 1.05
+    assert report.peak_voltage_ratio <= 1.05
+    assert report.peak_speed_ratio <= 1.0
+
+
+def test_a_sampled_plan_is_continuous(forward):
+    plan = forward.plan
+    step = 1e-6
+    for time in np.linspace(0.01, plan.landing_time - 0.01, 37):
+        here, next_ = plan.sample(time), plan.sample(time + step)
+        np.testing.assert_allclose(next_.com, here.com, atol=10 * step)
+        np.testing.assert_allclose(next_.q, here.q, atol=100 * step)
+
+
+def test_a_placed_plan_is_the_same_motion_elsewhere(forward, robot):
+    plan = forward.plan
+    moved = plan.placed(np.array([1.0, 2.0, 0.3]), 0.7).checked(robot)
+    back = moved.placed(np.zeros(3), -0.7)
+    shift = rotation.matrix(rotation.about_z(-0.7)) @ np.array([1.0, 2.0, 0.3])
+    np.testing.assert_allclose(back.com - shift, plan.com, atol=1e-12)
+    np.testing.assert_allclose(moved.foot_position[5], [robot.contact_positions(moved.q[5])[i] for i in range(4)], atol=1e-6)
+
+
+def test_the_same_request_gives_the_same_plan_to_the_last_bit(planner, forward):
+    again = planner.plan(jump(0.4, 0.0)).plan
+    np.testing.assert_array_equal(again.q, forward.plan.q)
+    np.testing.assert_array_equal(again.force, forward.plan.force)
+
+
+def test_a_plan_starts_where_the_robot_stands(planner, robot):
+    q = robot.standing_configuration()
+    rng = np.random.default_rng(3)
+    q[7:] += rng.uniform(-0.02, 0.02, 12)
+    q[:3] += [2.0, -1.0, 0.16]
+    q[3:7] = rotation.multiply(rotation.about_z(2.0), q[3:7])
+    plan = planner.plan(jump(0.3, 0.0), Estimate(time=0.0, q=q, v=np.zeros(18))).plan
+    np.testing.assert_allclose(plan.q[0, 7:], q[7:], atol=1e-6)
+    feet = plan.placed(*robot.start_frame(q)).foot_position[0]
+    np.testing.assert_allclose(feet, robot.contact_positions(q), atol=1e-6)
+
+
+@pytest.mark.parametrize("variant", ["KD", "AAKD", "AAKD*"])
+@pytest.mark.parametrize("warm_start", [True, False])
+def test_every_variant_finds_the_same_easy_jump(planner, forward, variant, warm_start):
+    plan = planner.plan(jump(0.4, 0.0, variant=variant, warm_start=warm_start)).plan
+    np.testing.assert_allclose(plan.com, forward.plan.com, atol=5e-3)
+
+
+def test_ipopt_finds_what_fatrop_finds(robot, forward):
+    plan = Planner(robot, solver="ipopt").plan(jump(0.4, 0.0)).plan
+    np.testing.assert_allclose(plan.com, forward.plan.com, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "code", "sentence"),
+    [
+        (MotionRequest(motion="jmp"), RefusalCode.UNKNOWN_MOTION, "did you mean 'jump'"),
+        (jump(3.0, 0.0), RefusalCode.OUT_OF_REACH, "friction"),
+        (jump(0.0, 2.0), RefusalCode.NO_SOLUTION, "binds: .*friction"),
+        (jump(0.6, 0.0, 2.0, terrain=Terrain.platform(2.0, 0.3, 0.0)), RefusalCode.NO_SOLUTION, "binds: .*(voltage|torque)"),
+        (jump(0.6, 0.0, 0.5, terrain=Terrain.platform(0.5, 0.3, 0.0)), RefusalCode.NO_SOLUTION, "binds: .*(voltage|torque)"),
+        (jump(0.3, 0.0, 0.16, terrain=Terrain.platform(0.16, 0.25, 0.0)), RefusalCode.CHECK_FAILED, "platform edge"),
+        (jump(0.4, 0.0, 0.16), RefusalCode.INVALID_REQUEST, "the ground there is 0.00 m"),
+        (MotionRequest(motion="jump", rotation=0.5), RefusalCode.INVALID_REQUEST, "no rotation to set"),
+        (jump(0.3, 0.0, variant="AKD"), RefusalCode.INVALID_REQUEST, "unknown variant 'AKD'"),
+    ],
+)
+def test_a_goal_that_cannot_be_is_refused_with_the_reason(planner, wanted, code, sentence):
+    with pytest.raises(RefusalError, match=sentence) as refusal:
+        planner.plan(wanted)
+    assert refusal.value.code is code
+    assert refusal.value.report.total_time_s < REFUSAL_TIME
+    assert refusal.value.report.refusal == {"code": code.value, "reason": refusal.value.reason}
+
+
+@pytest.mark.parametrize("field", ["q", "v", "com", "force", "foot_position", "landing_joint_position"])
+def test_a_plan_with_a_nan_is_refused_by_name(forward, robot, field):
+    value = np.array(getattr(forward.plan, field))
+    value.flat[3] = np.nan
+    with pytest.raises(InvalidPlanError, match=f"plan field {field}: not finite"):
+        dataclasses.replace(forward.plan, **{field: value}).checked(robot)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"model_hash": "other"}, "plan is for robot"),
+        ({"take_off_time": 5.0}, "take_off_time < landing_time"),
+        ({"landing_yaw": float("inf")}, "landing_yaw: expected a finite number"),
+        ({"com": np.zeros((2, 3))}, "plan field com: expected shape"),
+        ({"time": np.zeros(76)}, "time"),
+    ],
+)
+def test_an_inconsistent_plan_is_refused(forward, robot, change, sentence):
+    with pytest.raises(InvalidPlanError, match=sentence):
+        dataclasses.replace(forward.plan, **change).checked(robot)
