@@ -84,11 +84,11 @@ class Controller:
         if self._phases.judge(state) in DAMPED:
             return self._drive.damped(measurement)
         target = self._phases.target(state)
-        vdot_cmd = prioritized(state.M_inv, prioritized_tasks(state, target, self._limbs, self._gains))
+        vdot_cmd, v_ref = prioritized(state.M_inv, prioritized_tasks(state, target, self._limbs, self._gains))
         solution = self._qp.solve(state, vdot_cmd, target.force, target.contact)
         self._fallback_ticks += not solution.solved
         self._now = (state, target)
-        return self._drive.command(state, target, solution, measurement)
+        return self._drive.command(state, solution, v_ref, measurement)
 
     def accept(self, plan: Plan) -> None:
         """Begin ``plan``, given in the start heading frame, with the next measurement.

@@ -9,7 +9,6 @@ from aerial_model.robot import JOINT_VELOCITY, Robot
 from aerial_model.state import Command, Measurement
 from aerial_wbic.gains import ControllerGains
 from aerial_wbic.qp import Solution
-from aerial_wbic.target import WholeBodyTarget
 
 
 class Drive:
@@ -29,18 +28,25 @@ class Drive:
         self.saturated_ticks = 0
 
     def command(
-        self, state: Configuration, target: WholeBodyTarget, solution: Solution, measurement: Measurement
+        self, state: Configuration, solution: Solution, v_ref: np.ndarray, measurement: Measurement
     ) -> Command:
         """Return the command for an acceleration and forces that obey the base's equations of motion.
 
-        τ = joint rows of H q̈ + C q̇ + G − J_cᵀ f_r, plus the friction the motion will meet. Damping about the target's
-        joint velocity rides along.
+        τ = joint rows of H q̈ + C q̇ + G − J_cᵀ f_r, plus the friction of the joints moving at q̇_ref. Damping about
+        q̇_ref rides along.
+
+        Args:
+            state: of the robot.
+            solution: q̈ and f_r.
+            v_ref: q̇_ref ``(nv,)``; of the tasks, not measured, so that friction is overcome also from rest.
+            measurement: that is answered.
         """
-        torque = inverse_dynamics(state, solution) + self._law.friction(target.joint_velocity, self._stiction_speed)
+        velocity = v_ref[JOINT_VELOCITY]
+        torque = inverse_dynamics(state, solution) + self._law.friction(velocity, self._stiction_speed)
         command = Command(
             torque=torque,
-            position=target.joint_position,
-            velocity=target.joint_velocity,
+            position=measurement.joint_position,
+            velocity=velocity,
             stiffness=self._zeros,
             damping=self._joint_damping,
             state_time=measurement.time,

@@ -5,9 +5,9 @@ unit reports. Given the attitude, position and velocity of the base and the posi
 obey a linear model; noise is taken to be the same in all directions, so the three axes of W share one covariance and one
 gain: the state is a matrix X ``(2 + n_c, 3)`` with rows [p, v, c_1 …], the covariance P is ``(2 + n_c, 2 + n_c)``.
 
-    ṗ = v,   v̇ = R f + g + w_a,   ċ_i = w_c          f: specific force the accelerometer reads
-    0 = p + R p_i(q_j) − c_i + w_p                    p_i: contact point i in B
-    0 = v + R (ω × p_i + ṗ_i) + w_v
+    ṗ = v,   v̇ = R f + g + w_a,   ċ_i = u_i + w_c    f: specific force the accelerometer reads
+    0 = p + R p_i(q_j) − c_i + w_p                    p_i: centre of contact sphere i in B
+    u_i = v + R (ω × p_i + ṗ_i) + w_v                 u_i: velocity of a centre whose sphere rolls
 
 Only loaded points are measured. Where a point touches down is where forward kinematics says it does: nothing is assumed
 about the height of the ground. A loaded point that moves against the filter's belief (not yet down, slipping) is believed
@@ -45,7 +45,7 @@ class Estimator:
         self._data = robot.model.createData()
         self._q = np.zeros(robot.model.nq)  # base at the origin
         self._v = np.zeros(robot.model.nv)
-        self._radius = float(np.mean([point.radius for point in robot.contact_points]))
+        self._radius = np.array([point.radius for point in robot.contact_points])  # (n_c,) [m]
         self.reset()
 
     def reset(self) -> None:
@@ -73,20 +73,21 @@ class Estimator:
             self._begin(measurement)
         else:
             self._predict(measurement)
-        offset, offset_velocity = self._forward_kinematics(measurement)
-        self._correct(offset, offset_velocity, contact)
+        offset, offset_velocity, roll = self._forward_kinematics(measurement)
+        self._correct(offset, offset_velocity, roll, contact)
         if measurement.localization is not None:
             self._correct_position(measurement.localization)
         return self._estimate(measurement)
 
     def _begin(self, measurement: Measurement) -> None:
         self._orientation = measurement.orientation
-        offset, _ = self._forward_kinematics(measurement)
+        offset, _, roll = self._forward_kinematics(measurement)
         n_c = len(offset)
         self._X = np.zeros((2 + n_c, 3))
-        self._X[P] = [0.0, 0.0, self._radius] - offset.mean(axis=0)
+        self._X[P] = [0.0, 0.0, self._radius.mean()] - offset.mean(axis=0)
         self._P = np.diag([0.0, self._noise.foot_velocity**2, *np.full(n_c, _LOST**2)])
         self._anchored = np.zeros(n_c, dtype=bool)
+        self._roll = roll
         self._remember(measurement)
 
     def _predict(self, measurement: Measurement) -> None:
@@ -100,6 +101,7 @@ class Estimator:
         X, P_, noise = self._X, self._P, self._noise
         X[P] += X[V] * dt + a * dt**2 / 2
         X[V] += a * dt
+        X[FEET] += self._roll * dt
         F = np.eye(len(X))
         F[P, V] = dt
         P_ = F @ P_ @ F.T
@@ -113,8 +115,12 @@ class Estimator:
         self._time = measurement.time
         self._gyro = measurement.angular_velocity
 
-    def _forward_kinematics(self, measurement: Measurement) -> tuple[np.ndarray, np.ndarray]:
-        """Return R p_i and R (ω × p_i + ṗ_i), contact points against the base in W's axes, ``(n_c, 3)`` each."""
+    def _forward_kinematics(self, measurement: Measurement) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return R p_i, R (ω × p_i + ṗ_i) and u_i in W's axes, ``(n_c, 3)`` each.
+
+        A sphere that rolls without slip on level ground has its centre moving at ω_i × (0, 0, radius), with ω_i the
+        angular velocity of its link: at take-off 2 cm/s.
+        """
         q, v = self._q, self._v
         q[BASE_ORIENTATION] = self._orientation
         q[JOINT_POSITION] = measurement.joint_position
@@ -125,21 +131,26 @@ class Estimator:
         frames = self._robot.contact_frames
         offset = np.array([pin.updateFramePlacement(model, data, frame).translation for frame in frames])
         axes = pin.LOCAL_WORLD_ALIGNED
-        velocity = np.array([pin.getFrameVelocity(model, data, frame, axes).linear for frame in frames])
-        return offset, velocity
+        twist = np.array([pin.getFrameVelocity(model, data, frame, axes).vector for frame in frames])  # (n_c, 6)
+        roll = np.zeros_like(offset)
+        roll[:, 0], roll[:, 1] = twist[:, 4] * self._radius, -twist[:, 3] * self._radius
+        return offset, twist[:, :3], roll
 
-    def _correct(self, offset: np.ndarray, offset_velocity: np.ndarray, contact: np.ndarray) -> None:
+    def _correct(
+        self, offset: np.ndarray, offset_velocity: np.ndarray, roll: np.ndarray, contact: np.ndarray
+    ) -> None:
         X, noise = self._X, self._noise
         loaded = np.flatnonzero(contact)
-        slip = -offset_velocity[loaded] - X[V]  # innovation of 0 = v + ṗ_i
+        slip = roll[loaded] - offset_velocity[loaded] - X[V]  # innovation of u_i = v + R (ω × p_i + ṗ_i)
         variance = self._P[V, V] + noise.foot_velocity**2
         distrust = np.maximum(1.0, np.sum(slip**2, axis=1) / (3 * _GATE * variance))
         for i in loaded[~self._anchored[loaded] | (distrust > 1)]:
             self._anchor(i, offset[i])
         self._anchored = contact.copy()
+        self._roll = np.where(contact[:, None], roll, 0.0)
         if not len(loaded):
             return
-        miss = X[FEET][loaded] - offset[loaded] - X[P]  # innovation of 0 = p + p_i − c_i
+        miss = X[FEET][loaded] - offset[loaded] - X[P]  # innovation of 0 = p + R p_i − c_i
         n = len(loaded)
         H = np.zeros((2 * n, len(X)))
         H[:n, P] = 1.0

@@ -13,7 +13,13 @@ class Feedback:
     damping: float  # K_d [1/s]
 
     def __post_init__(self) -> None:
-        _check_not_negative(self)
+        if not (self.stiffness >= 0 and self.damping > 0):
+            raise ValueError(f"stiffness must not be negative and damping must be positive, found {self}")
+
+    @property
+    def rate(self) -> float:
+        """K_p / K_d, the rate at which the feedback closes a gap [1/s]."""
+        return self.stiffness / self.damping
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,25 +15,29 @@ import numpy as np
 RANK_THRESHOLD = 1e-7  # least eigenvalue of J H⁻¹ Jᵀ that counts, an inverse inertia [1/kg] (or [kg] for momenta)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Task:
-    """One physical statement about the generalized acceleration: J q̈ = a, with a = ẍ_cmd − J̇ q̇."""
+    """One physical statement about a task coordinate x with ẋ = J q̇: its acceleration and its velocity.
+
+    The velocity is not needed for the acceleration; it tells which way the joints are about to move.
+    """
 
     J: np.ndarray  # (m, nv)
-    a: np.ndarray  # (m,)
+    a: np.ndarray  # ẍ_cmd − J̇ q̇ (m,)
+    xdot: np.ndarray  # ẋ_ref (m,)
 
 
-def prioritized(M_inv: np.ndarray, tasks: Iterable[Task]) -> np.ndarray:
-    """Return q̈_cmd ``(nv,)`` of tasks in falling priority, thesis (3.23).
+def prioritized(M_inv: np.ndarray, tasks: Iterable[Task]) -> tuple[np.ndarray, np.ndarray]:
+    """Return q̈_cmd and q̇_ref ``(nv,)`` of tasks in falling priority, thesis (3.23), the same for both.
 
-    Of the accelerations that do equally well it is the one of least kinetic energy, ‖q̈‖ in the metric of H.
+    Of those that do equally well they are the ones of least kinetic energy, the least in the metric of H.
 
     Args:
         M_inv: H⁻¹ ``(nv, nv)``.
         tasks: the first is the most important; a task of no rows is allowed.
     """
     nv = len(M_inv)
-    vdot = np.zeros(nv)
+    command = np.zeros((nv, 2))  # columns q̈_cmd, q̇_ref
     N = np.eye(nv)  # projects on what the tasks so far leave free
     for task in tasks:
         if not len(task.a):
@@ -42,9 +46,9 @@ def prioritized(M_inv: np.ndarray, tasks: Iterable[Task]) -> np.ndarray:
         J_bar, rank = consistent_inverse(J_pre, M_inv)
         if rank == 0:
             continue
-        vdot = vdot + J_bar @ (task.a - task.J @ vdot)
+        command = command + J_bar @ (np.column_stack([task.a, task.xdot]) - task.J @ command)
         N = N - J_bar @ J_pre
-    return vdot
+    return command[:, 0], command[:, 1]
 
 
 def consistent_inverse(J: np.ndarray, M_inv: np.ndarray) -> tuple[np.ndarray, int]:

@@ -1,7 +1,7 @@
 """The tasks of the whole-body controller in the order of their priority, thesis (3.26)–(3.29).
 
-One function per physical statement; each returns J and ẍ_cmd − J̇ q̇ with the feedback of (3.22),
-ẍ_cmd = ẍ_des + K_p (x_des − x) + K_d (ẋ_des − ẋ).
+One function per physical statement. The feedback of (3.22), ẍ_cmd = ẍ_des + K_p (x_des − x) + K_d (ẋ_des − ẋ), is that of
+a velocity that also closes the gap: ẍ_cmd = ẍ_des + K_d (ẋ_ref − ẋ) with ẋ_ref = ẋ_des + K_p / K_d (x_des − x).
 """
 
 from __future__ import annotations
@@ -52,22 +52,20 @@ def limb_task(state: Configuration, target: WholeBodyTarget, swinging: np.ndarra
     without a singularity, and the base, which nothing can steer there, does not pull it off its course.
     """
     loaded = np.flatnonzero(target.contact)
-    J = np.zeros((3 * len(loaded) + len(swinging), len(state.v)))
-    a = np.zeros(len(J))
+    n_loaded = 3 * len(loaded)
+    J = np.zeros((n_loaded + len(swinging), len(state.v)))
+    a, xdot = np.zeros((2, len(J)))
     for row, i in enumerate(loaded):
         rows = slice(3 * row, 3 * row + 3)
         J[rows] = state.J_c(i)
         a[rows] = -state.Jdot_v_c(i)
     if len(swinging):
-        rows = slice(3 * len(loaded), None)
-        q, v = state.q[JOINT_POSITION][swinging], state.v[JOINT_VELOCITY][swinging]
-        J[rows, JOINT_VELOCITY][np.arange(len(swinging)), swinging] = 1.0
-        a[rows] = (
-            target.joint_acceleration[swinging]
-            + feedback.stiffness * (target.joint_position[swinging] - q)
-            + feedback.damping * (target.joint_velocity[swinging] - v)
-        )
-    return Task(J=J, a=a)
+        gap = target.joint_position[swinging] - state.q[JOINT_POSITION][swinging]
+        J[n_loaded:, JOINT_VELOCITY][np.arange(len(swinging)), swinging] = 1.0
+        xdot[n_loaded:] = target.joint_velocity[swinging] + feedback.rate * gap
+        slack = xdot[n_loaded:] - state.v[JOINT_VELOCITY][swinging]
+        a[n_loaded:] = target.joint_acceleration[swinging] + feedback.damping * slack
+    return Task(J=J, a=a, xdot=xdot)
 
 
 def base_task(state: Configuration, body: BodyTarget) -> Task:
@@ -77,30 +75,27 @@ def base_task(state: Configuration, body: BodyTarget) -> Task:
     it is what a ballistic flight and the balance after landing depend on, whatever the limbs' errors.
     """
     R = state.R_WB
-    A, bias, mass = state.A_G, state.Adot_v_G, state.robot.mass
+    mass = state.robot.mass
     J = np.zeros((6, len(state.v)))
     J[ANGULAR, BASE_ANGULAR] = R
-    J[LINEAR] = A[LINEAR] / mass
+    J[LINEAR] = state.A_G[LINEAR] / mass
     attitude, position = body.gains.attitude, body.gains.position
-    angular_velocity = R @ state.v[BASE_ANGULAR]
-    angular = (
-        body.angular_acceleration
-        + attitude.stiffness * attitude_error(body.orientation, state.base_orientation)
-        + attitude.damping * (body.angular_velocity - angular_velocity)
+    turn = attitude_error(body.orientation, state.base_orientation)
+    omega_ref = body.angular_velocity + attitude.rate * turn
+    angular = body.angular_acceleration + attitude.damping * (omega_ref - R @ state.v[BASE_ANGULAR])
+    rdot_ref = body.com_velocity + position.rate * (body.com - state.com)
+    linear = body.com_acceleration + position.damping * (rdot_ref - state.com_velocity)
+    return Task(
+        J=J,
+        a=np.concatenate([angular, linear - state.Adot_v_G[LINEAR] / mass]),
+        xdot=np.concatenate([omega_ref, rdot_ref]),
     )
-    linear = (
-        body.com_acceleration
-        + position.stiffness * (body.com - state.com)
-        + position.damping * (body.com_velocity - state.com_velocity)
-        - bias[LINEAR] / mass
-    )
-    return Task(J=J, a=np.concatenate([angular, linear]))
 
 
 def angular_momentum_task(state: Configuration, target: WholeBodyTarget, damping: float) -> Task:
     """Task 2, (3.28)–(3.29): α̇_cmd = α̇_des + K_d,CAM (α_des − α), with no position to feed back."""
     alphadot = target.angular_momentum_rate + damping * (target.angular_momentum - state.angular_momentum)
-    return Task(J=state.A_G[ANGULAR], a=alphadot - state.Adot_v_G[ANGULAR])
+    return Task(J=state.A_G[ANGULAR], a=alphadot - state.Adot_v_G[ANGULAR], xdot=target.angular_momentum)
 
 
 def attitude_error(desired: np.ndarray, actual: np.ndarray) -> np.ndarray:
