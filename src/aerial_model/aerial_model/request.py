@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 import numpy as np
 
@@ -15,6 +16,15 @@ from aerial_model.terrain import HURDLE_THICKNESS, PLATFORM_LENGTH, Terrain
 
 UPPER_MARGIN = 0.08  # of the feet on the platform from its edge [m]: more than the least, for landings off the goal
 LOWER_MARGIN = 0.03  # of the feet below it from its edge [m]
+
+
+class ControllerCommand(StrEnum):
+    """Selections that the controller carries out by itself: they need no plan."""
+
+    STAND = "stand"
+    LIE_DOWN = "lie_down"
+    STAND_UP = "stand_up"
+    ABORT = "abort"
 
 
 @dataclass(frozen=True, kw_only=True)

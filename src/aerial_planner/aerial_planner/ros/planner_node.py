@@ -1,0 +1,177 @@
+"""The planner as a process: a selection in, a plan and an answer out; previews on the side.
+
+Every selection gets an answer, whatever it holds, and nothing it holds ends the node.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+from aerial_msgs.action import PlanMotion
+from aerial_msgs.msg import MotionPlan, MotionResult, MotionSelection
+from diagnostic_msgs.msg import DiagnosticStatus
+from nav_msgs.msg import Odometry
+from rclpy.action import ActionServer, CancelResponse
+from rclpy.action.server import ServerGoalHandle
+from rclpy.qos import QoSProfile, qos_profile_sensor_data
+from sensor_msgs.msg import JointState
+
+from aerial_model.errors import AerialError, RefusalError
+from aerial_model.request import ControllerCommand, MotionRequest
+from aerial_model.robot import Robot
+from aerial_model.ros import node
+from aerial_model.ros.messages import (
+    code_to_message,
+    estimate_from_messages,
+    plan_to_message,
+    result_to_message,
+    selection_from_message,
+)
+from aerial_model.state import Estimate
+from aerial_planner.planner import Planner
+from aerial_planner.ros.worker import Worker
+from aerial_planner.schedule import known_motions
+
+EVENT_QOS = QoSProfile(depth=10)  # reliable, volatile
+
+
+class _CancelledError(Exception):
+    """The client of a preview does not want it any more."""
+
+
+class PlannerNode(node.AerialNode):
+    """Plans what is selected, from where the robot is believed to stand.
+
+    Parameters: ``solver`` (fatrop or ipopt), ``niceness`` of the planning thread (0 to 19), ``warm_up`` (build the
+    problems of all motions on activation), and those of every node.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("planner", **options)
+        self.declare_parameter("solver", "fatrop")
+        self.declare_parameter("niceness", 10)
+        self.declare_parameter("warm_up", True)
+
+    def configure(self) -> None:
+        """Load the robot, make the planner, open the interfaces."""
+        self._robot = Robot.load(self.get_parameter("robot").value)
+        self._planner = Planner(self._robot, solver=self.get_parameter("solver").value)
+        self._worker = Worker(self.get_parameter("niceness").value, self.get_logger())
+        self._active = False
+        self._odometry: Odometry | None = None
+        self._joints: JointState | None = None
+        self._counts = {"planned": 0, "refused": 0}
+        self._plans = self.create_lifecycle_publisher(MotionPlan, "motion_plan", EVENT_QOS)
+        self._results = self.create_lifecycle_publisher(MotionResult, "motion_result", EVENT_QOS)
+        self._inputs = [
+            self.create_subscription(MotionSelection, "motion_selection", self._on_selection, EVENT_QOS),
+            self.create_subscription(Odometry, "odometry", partial(setattr, self, "_odometry"), qos_profile_sensor_data),
+            self.create_subscription(JointState, "joint_states", partial(setattr, self, "_joints"), qos_profile_sensor_data),
+        ]
+        # A goal is executed, in ROS's sense, when its plan is there: until then the worker has it, and the node listens.
+        self._previews = ActionServer(
+            self,
+            PlanMotion,
+            "plan_motion",
+            execute_callback=lambda goal: PlanMotion.Result(),
+            handle_accepted_callback=self._on_preview,
+            cancel_callback=lambda goal: CancelResponse.ACCEPT,
+        )
+
+    def activate(self) -> None:
+        """Take selections from now on; build the problems of all motions meanwhile."""
+        self._active = True
+        if self.get_parameter("warm_up").value:
+            self._worker.prepare("warming up", self._warm_up)
+
+    def deactivate(self) -> None:
+        """Take no more selections."""
+        self._active = False
+
+    def cleanup(self) -> None:
+        """Finish the plan that is being made, then close the interfaces."""
+        self._worker.shutdown()
+        self._previews.destroy()
+        for subscription in self._inputs:
+            self.destroy_subscription(subscription)
+        for publisher in (self._plans, self._results):
+            self.destroy_lifecycle_publisher(publisher)
+
+    def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
+        """Return what the planner is at, and what it did so far."""
+        figures = {"robot": self._robot.name, "model_hash": self._robot.model_hash, **self._counts}
+        return DiagnosticStatus.OK, self._worker.activity, figures
+
+    def _on_selection(self, selection: MotionSelection) -> None:
+        if not self._active or selection.motion in list(ControllerCommand):
+            return
+        self._worker.serve(
+            f"planning {selection.motion} {selection.request_id}",
+            partial(self._plan, selection, self._start()),
+            partial(self._answer, selection, MotionResult.REFUSED),
+        )
+
+    def _on_preview(self, goal: ServerGoalHandle) -> None:
+        self._worker.serve(
+            f"previewing {goal.request.selection.motion}",
+            partial(self._plan_preview, goal, self._start()),
+            lambda refusal: goal.execute(partial(_refused_preview, refusal)),
+        )
+
+    def _warm_up(self) -> None:
+        for motion in known_motions():
+            try:
+                self._planner.warm_up(MotionRequest(motion=motion))
+            except AerialError as error:
+                self.get_logger().warning(f"cannot prepare {motion}: {error}")
+        self.get_logger().info(f"ready to plan for {self._robot.name}: {', '.join(known_motions())}")
+
+    def _plan(self, selection: MotionSelection, start: Estimate | None) -> None:
+        result = self._planner.plan(selection_from_message(selection), start)
+        self._answer(selection, MotionResult.PLANNED)
+        self._plans.publish(plan_to_message(result.plan, self._robot))
+
+    def _answer(self, selection: MotionSelection, outcome: int, refusal: RefusalError | None = None) -> None:
+        self._counts["planned" if refusal is None else "refused"] += 1
+        stamp = self.get_clock().now().to_msg()
+        self._results.publish(result_to_message(selection.request_id, selection.motion, outcome, stamp, refusal))
+
+    def _plan_preview(self, goal: ServerGoalHandle, start: Estimate | None) -> None:
+        def progress(stage: str, iteration: int, residual: float) -> None:
+            if goal.is_cancel_requested:
+                raise _CancelledError
+            goal.publish_feedback(PlanMotion.Feedback(stage=stage, iteration=int(iteration), residual=float(residual)))
+
+        try:
+            result = self._planner.plan(selection_from_message(goal.request.selection), start, progress)
+        except _CancelledError:
+            goal.execute(_cancelled_preview)
+        else:
+            goal.execute(partial(_finished_preview, plan_to_message(result.plan, self._robot)))
+
+    def _start(self) -> Estimate | None:
+        """Return the freshest estimate; None before there is one."""
+        if self._odometry is None or self._joints is None:
+            return None
+        return estimate_from_messages(self._odometry, self._joints, self._robot)
+
+
+def _finished_preview(plan: MotionPlan, goal: ServerGoalHandle) -> PlanMotion.Result:
+    goal.succeed()
+    return PlanMotion.Result(success=True, plan=plan)
+
+
+def _cancelled_preview(goal: ServerGoalHandle) -> PlanMotion.Result:
+    goal.canceled()
+    return PlanMotion.Result()
+
+
+def _refused_preview(refusal: RefusalError, goal: ServerGoalHandle) -> PlanMotion.Result:
+    goal.abort()
+    return PlanMotion.Result(code=code_to_message(refusal.code), reason=refusal.reason)
+
+
+def main() -> None:
+    """Run the node until SIGINT or SIGTERM."""
+    node.main(PlannerNode)
