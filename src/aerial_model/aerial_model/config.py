@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import types
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, TypeVar, get_args, get_type_hints
 
 import numpy as np
 import yaml
@@ -85,6 +86,10 @@ def from_mapping(cls: type[T], mapping: Any, where: str) -> T:
 
 
 def _convert(kind: Any, value: Any, where: str) -> Any:
+    if isinstance(kind, types.UnionType):  # X | None
+        if value is None:
+            return None
+        kind = next(member for member in get_args(kind) if member is not types.NoneType)
     if dataclasses.is_dataclass(kind) and isinstance(kind, type):
         return from_mapping(kind, value, where)
     if kind is np.ndarray:
