@@ -10,7 +10,6 @@ from array import array
 from collections.abc import Sequence
 
 import numpy as np
-from aerial_msgs.msg import MotionPlan, MotionResult, MotionSelection, TerrainBox
 from builtin_interfaces.msg import Time
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
@@ -19,8 +18,9 @@ from aerial_model.errors import ConfigurationError, InvalidPlanError, RefusalCod
 from aerial_model.plan import Plan
 from aerial_model.request import MotionRequest
 from aerial_model.robot import Robot
-from aerial_model.state import Estimate
+from aerial_model.state import Command, Estimate, Measurement
 from aerial_model.terrain import Box, Terrain
+from aerial_msgs.msg import JointCommand, MotionPlan, MotionResult, MotionSelection, RobotState, TerrainBox
 
 _NANO = 1_000_000_000
 
@@ -53,7 +53,9 @@ def doubles(values: np.ndarray) -> array:
 
 def terrain_to_message(terrain: Terrain) -> list[TerrainBox]:
     """Return the boxes of a terrain."""
-    return [TerrainBox(centre=np.array(box.centre), size=np.array(box.size), yaw=float(box.yaw)) for box in terrain.boxes]
+    return [
+        TerrainBox(centre=np.array(box.centre), size=np.array(box.size), yaw=float(box.yaw)) for box in terrain.boxes
+    ]
 
 
 def terrain_from_message(boxes: Sequence[TerrainBox]) -> Terrain:
@@ -148,7 +150,9 @@ def plan_from_message(message: MotionPlan, robot: Robot) -> Plan:
     """
     joints = list(message.joint_names)
     if message.model_hash == robot.model_hash and joints != list(robot.joint_names):
-        raise InvalidPlanError(f"plan field joint_names: expected {', '.join(robot.joint_names)}, found {', '.join(joints)}")
+        raise InvalidPlanError(
+            f"plan field joint_names: expected {', '.join(robot.joint_names)}, found {', '.join(joints)}"
+        )
     try:
         terrain = terrain_from_message(message.terrain)
     except (ConfigurationError, ValueError) as error:
@@ -193,3 +197,60 @@ def estimate_from_messages(odometry: Odometry, joints: JointState, robot: Robot)
     if not (np.all(np.isfinite(q)) and np.all(np.isfinite(v))):
         return None
     return Estimate(time=from_stamp(odometry.header.stamp), q=q, v=v)
+
+
+# --- the control loop ------------------------------------------------------------------------------------------------
+
+_COMMAND_ROWS = ("torque", "position", "velocity", "stiffness", "damping")
+_STATE_VECTORS = ("orientation", "angular_velocity", "linear_acceleration")
+_STATE_ROWS = ("joint_position", "joint_velocity", "joint_torque")
+
+
+def state_to_message(measurement: Measurement) -> RobotState:
+    """Return the message that carries a measurement."""
+    localization = measurement.localization
+    return RobotState(
+        stamp=to_stamp(measurement.time),
+        sequence=int(measurement.sequence),
+        has_localization=localization is not None,
+        localization=np.zeros(3) if localization is None else np.array(localization, dtype=np.float64),
+        **{name: np.array(getattr(measurement, name), dtype=np.float64) for name in _STATE_VECTORS},
+        **{name: doubles(getattr(measurement, name)) for name in _STATE_ROWS},
+    )
+
+
+def state_from_message(message: RobotState) -> Measurement:
+    """Return the measurement a message carries."""
+    return Measurement(
+        time=from_stamp(message.stamp),
+        sequence=message.sequence,
+        localization=np.array(message.localization) if message.has_localization else None,
+        **{name: np.array(getattr(message, name)) for name in (*_STATE_VECTORS, *_STATE_ROWS)},
+    )
+
+
+def command_to_message(command: Command, stamp: Time) -> JointCommand:
+    """Return the message that carries a command."""
+    return JointCommand(
+        stamp=stamp,
+        state_stamp=to_stamp(command.state_time),
+        state_sequence=int(command.state_sequence),
+        **{name: doubles(getattr(command, name)) for name in _COMMAND_ROWS},
+    )
+
+
+def command_from_message(message: JointCommand, robot: Robot) -> Command:
+    """Return the command a message carries.
+
+    Raises:
+        ValueError: if a field does not hold one finite number for every joint.
+    """
+    rows = {name: np.array(getattr(message, name)) for name in _COMMAND_ROWS}
+    for name, row in rows.items():
+        if row.shape != (robot.n_joints,) or not np.isfinite(row).all():
+            raise ValueError(f"command field {name}: expected {robot.n_joints} finite numbers, found {row.tolist()}")
+    return Command(
+        state_time=from_stamp(message.state_stamp),
+        state_sequence=message.state_sequence,
+        **rows,
+    )
