@@ -1,0 +1,39 @@
+"""The manifests say what the code needs, so that rosdep can install it and colcon builds in the right order."""
+
+import ast
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+SOURCES = Path(__file__).resolve().parents[2] / "src"
+PACKAGES = sorted(setup.parent.name for setup in SOURCES.glob("*/setup.py"))
+ROSDEP_KEYS = {"PIL": "python3-pil", "matplotlib": "python3-matplotlib", "numpy": "python3-numpy"}
+ROSDEP_KEYS |= {"scipy": "python3-scipy", "yaml": "python3-yaml"}
+WITHOUT_ROSDEP_KEY = {"casadi", "mujoco", "osqp", "pinocchio", "rosbags"}  # README: from requirements.txt
+
+
+def imports(package):
+    """Top-level modules that a package's code imports."""
+    names = set()
+    for file in (SOURCES / package / package).rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.Import):
+                names |= {alias.name.split(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                names.add(node.module.split(".")[0])
+    return names - set(sys.stdlib_module_names) - {package}
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_a_manifest_names_every_import(package):
+    manifest = ElementTree.parse(SOURCES / package / "package.xml")
+    declared = {element.text for kind in ("depend", "exec_depend") for element in manifest.iter(kind)}
+    assert {ROSDEP_KEYS.get(name, name) for name in imports(package) - WITHOUT_ROSDEP_KEY} <= declared
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_a_package_has_one_version(package):
+    version = ElementTree.parse(SOURCES / package / "package.xml").findtext("version")
+    assert f'version="{version}"' in (SOURCES / package / "setup.py").read_text()
