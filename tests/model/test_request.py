@@ -17,7 +17,9 @@ angles = st.floats(-np.pi, np.pi)
 
 
 def towards(direction, distance, height):
-    return MotionRequest(motion="jump", displacement=[distance * np.cos(direction), distance * np.sin(direction), height])
+    return MotionRequest(
+        motion="jump", displacement=[distance * np.cos(direction), distance * np.sin(direction), height]
+    )
 
 
 def landing_feet(request):

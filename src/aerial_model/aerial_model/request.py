@@ -29,7 +29,10 @@ class ControllerCommand(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class MotionRequest:
-    """A motion selection, in the start heading frame (origin: centre of the support on the ground, x: heading, z: up)."""
+    """A motion selection.
+
+    Frame: the start heading frame, origin at the centre of the support on the ground, x along the heading, z up.
+    """
 
     motion: str
     displacement: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) of the support centre [m]
@@ -92,10 +95,11 @@ class MotionRequest:
     def _platform_edge(self, robot: Robot, *, down: bool) -> float:
         """Return the distance [m] of the edge to jump over.
 
-        The feet on the platform keep ``UPPER_MARGIN`` and those below it at least ``LOWER_MARGIN``; where both cannot be,
-        the edge is halfway between. Flying feet clear an edge the more easily the nearer it is to the upper feet.
+        The feet on the platform keep ``UPPER_MARGIN`` and those below it at least ``LOWER_MARGIN``; where both cannot
+        be, the edge is halfway between. Flying feet clear an edge the more easily the nearer it is to the upper feet.
         """
-        (rear_standing, front_standing), (rear_landing, front_landing) = self._standing_feet(robot), self._landing_feet(robot)
+        rear_standing, front_standing = self._standing_feet(robot)
+        rear_landing, front_landing = self._landing_feet(robot)
         if down:
             nearest, farthest = front_standing + UPPER_MARGIN, rear_landing - LOWER_MARGIN
             edge = nearest if nearest <= farthest else (nearest + farthest) / 2

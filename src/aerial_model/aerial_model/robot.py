@@ -105,7 +105,14 @@ class Robot:
         return from_mapping(cls, self.sections.get(name, {}), f"{self.folder / YAML_NAME}: {name}")
 
     def with_section(self, name: str, **changes: Any) -> Robot:
-        """Return this robot with keys of a section replaced, as ``--set section.key=value`` asks."""
+        """Return this robot with keys of a section replaced, as ``--set section.key=value`` asks.
+
+        Raises:
+            ConfigurationError: if there is no such section.
+        """
+        if name not in _SECTIONS:
+            known = ", ".join(_SECTIONS)
+            raise ConfigurationError(f"unknown section '{name}'{closest(name, _SECTIONS)}; known: {known}")
         sections = {**self.sections, name: {**self.sections.get(name, {}), **changes}}
         return dataclasses.replace(self, sections=sections)
 

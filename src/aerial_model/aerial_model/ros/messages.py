@@ -1,7 +1,7 @@
 """Messages from and to the model's types: every conversion is here, once, and explicit.
 
-rclpy does not check fields unless it is told to, and a wrong type becomes garbage on the wire: numbers are made Python's
-own, arrays ``array('d')`` or NumPy's float64.
+rclpy does not check fields unless it is told to, and a wrong type becomes garbage on the wire: numbers are made
+Python's own, arrays ``array('d')`` or NumPy's float64.
 """
 
 from __future__ import annotations
@@ -183,7 +183,7 @@ def _rows(message: MotionPlan, name: str, *shape: int) -> np.ndarray:
 
 
 def estimate_from_messages(odometry: Odometry, joints: JointState, robot: Robot) -> Estimate | None:
-    """Return where the robot is believed to be; None if the messages lack a joint or hold a number that is not finite."""
+    """Return where the robot is believed to be; None if a joint is missing or a number is not finite."""
     index = {name: k for k, name in enumerate(joints.name)}
     if any(name not in index for name in robot.joint_names) or len(joints.velocity) < len(index):
         return None

@@ -8,19 +8,16 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from aerial_msgs.action import PlanMotion
-from aerial_msgs.msg import MotionPlan, MotionResult, MotionSelection
 from diagnostic_msgs.msg import DiagnosticStatus
 from nav_msgs.msg import Odometry
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.action.server import ServerGoalHandle
-from rclpy.qos import QoSProfile, qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 
 from aerial_model.errors import AerialError, RefusalError
 from aerial_model.request import ControllerCommand, MotionRequest
 from aerial_model.robot import Robot
-from aerial_model.ros import node
+from aerial_model.ros import node, qos
 from aerial_model.ros.messages import (
     code_to_message,
     estimate_from_messages,
@@ -29,11 +26,11 @@ from aerial_model.ros.messages import (
     selection_from_message,
 )
 from aerial_model.state import Estimate
+from aerial_msgs.action import PlanMotion
+from aerial_msgs.msg import MotionPlan, MotionResult, MotionSelection
 from aerial_planner.planner import Planner
 from aerial_planner.ros.worker import Worker
 from aerial_planner.schedule import known_motions
-
-EVENT_QOS = QoSProfile(depth=10)  # reliable, volatile
 
 
 class _CancelledError(Exception):
@@ -62,14 +59,14 @@ class PlannerNode(node.AerialNode):
         self._odometry: Odometry | None = None
         self._joints: JointState | None = None
         self._counts = {"planned": 0, "refused": 0}
-        self._plans = self.create_lifecycle_publisher(MotionPlan, "motion_plan", EVENT_QOS)
-        self._results = self.create_lifecycle_publisher(MotionResult, "motion_result", EVENT_QOS)
+        self._plans = self.create_lifecycle_publisher(MotionPlan, "motion_plan", qos.EVENT)
+        self._results = self.create_lifecycle_publisher(MotionResult, "motion_result", qos.EVENT)
         self._inputs = [
-            self.create_subscription(MotionSelection, "motion_selection", self._on_selection, EVENT_QOS),
-            self.create_subscription(Odometry, "odometry", partial(setattr, self, "_odometry"), qos_profile_sensor_data),
-            self.create_subscription(JointState, "joint_states", partial(setattr, self, "_joints"), qos_profile_sensor_data),
+            self.create_subscription(MotionSelection, "motion_selection", self._on_selection, qos.EVENT),
+            self.create_subscription(Odometry, "odometry", partial(setattr, self, "_odometry"), qos.TELEMETRY),
+            self.create_subscription(JointState, "joint_states", partial(setattr, self, "_joints"), qos.TELEMETRY),
         ]
-        # A goal is executed, in ROS's sense, when its plan is there: until then the worker has it, and the node listens.
+        # A goal is executed, in ROS's sense, when its plan is there; until then the worker has it and the node listens.
         self._previews = ActionServer(
             self,
             PlanMotion,

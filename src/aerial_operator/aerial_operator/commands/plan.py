@@ -1,0 +1,70 @@
+"""``aerial plan``: one plan and its figures."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+from pathlib import Path
+
+from aerial_model.errors import RefusalError
+from aerial_model.plan_file import save_plan
+from aerial_model.robot import Robot
+from aerial_operator.console import Report, pairs, percent, say
+from aerial_operator.goal import add_goal_arguments, add_planner_arguments, request_from
+from aerial_planner.planner import Planner, PlanReport
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add goal, planner options and where to save the plan."""
+    add_goal_arguments(parser)
+    add_planner_arguments(parser)
+    parser.add_argument("--out", metavar="FILE", type=Path, help="save the plan (.npz, see aerial_model.plan_file)")
+
+
+def run(args: argparse.Namespace) -> Report:
+    """Plan on a warm planner: the building of its problems, once per process, is not counted."""
+    robot = Robot.load(args.robot)
+    request = request_from(args, robot, variant=args.variant, warm_start=not args.no_warm_start)
+    planner = Planner(robot, solver=args.solver)
+    with contextlib.suppress(RefusalError):  # which the plan raises again, with its figures
+        planner.warm_up(request)
+    try:
+        result = planner.plan(request)
+    except RefusalError as refusal:
+        say(f"refused: {refusal.reason}")
+        return Report(success=False, figures=refusal.report.to_json(), text=_times(refusal.report))
+    if args.out is not None:
+        save_plan(result.plan, args.out)
+    return Report(success=True, figures=result.report.to_json(), text=summary(result.report))
+
+
+def summary(report: PlanReport) -> str:
+    """Return the figures of a plan for a person."""
+    landing = ", ".join(f"{x:.2f}" for x in report.landing_position_m)
+    rotation = ", ".join(f"{x:.0f}" for x in report.rotation_deg)
+    return "\n".join(
+        [
+            _times(report),
+            pairs(
+                [
+                    ("take-off, flight", f"{report.take_off_time_s:.2f} s, {report.flight_time_s:.2f} s"),
+                    ("landing at", f"{landing} m"),
+                    ("rotation", f"{rotation}°"),
+                    ("peak torque", f"{percent(report.peak_torque_ratio)} of the limit"),
+                    ("peak voltage", f"{percent(report.peak_voltage_ratio)} of the limit"),
+                    ("peak speed", f"{percent(report.peak_speed_ratio)} of the limit"),
+                    ("worst violation", f"{report.max_violation:.1e}"),
+                ]
+            ),
+        ]
+    )
+
+
+def _times(report: PlanReport) -> str:
+    start = "warm" if report.warm_start else "cold"
+    outcome = "planned" if report.success else "refused"
+    return (
+        f"{report.motion} of {report.robot}, {report.variant}, {start} start, {report.solver}: {outcome} in "
+        f"{report.total_time_s:.2f} s (single rigid body {report.srbm_time_s:.2f} s, "
+        f"kino-dynamic {report.solve_time_s:.2f} s, {report.iterations} iterations)"
+    )
