@@ -6,6 +6,8 @@ Angular rows come first in ``A_G`` and ``h_G`` (thesis (2.5)); Pinocchio has the
 
 from __future__ import annotations
 
+from functools import cache, cached_property
+
 import numpy as np
 import pinocchio as pin
 
@@ -34,7 +36,8 @@ class Kinematics:
 class Configuration:
     """Quantities of a robot at one state, in W with Pinocchio's v (base twist in B, linear first).
 
-    Arrays are handed out as copies: Pinocchio's own would change with the next state, or outlive their memory.
+    Arrays are handed out as copies: Pinocchio's own would change with the next state, or outlive their memory. The large
+    ones are made once per state and are read-only.
     """
 
     def __init__(self, robot: Robot, data: pin.Data, q: np.ndarray, v: np.ndarray) -> None:
@@ -43,17 +46,15 @@ class Configuration:
         self.v = v
         self._data = data
 
-    @property
+    @cached_property
     def M(self) -> np.ndarray:  # noqa: N802  (the field's symbol)
         """Mass matrix H ``(nv, nv)``, rotor inertia included."""
-        upper = np.triu(self._data.M)
-        return upper + np.triu(upper, 1).T
+        return _symmetric(self._data.M)
 
-    @property
+    @cached_property
     def M_inv(self) -> np.ndarray:  # noqa: N802
         """Inverse of the mass matrix H⁻¹ ``(nv, nv)``."""
-        upper = np.triu(self._data.Minv)
-        return upper + np.triu(upper, 1).T
+        return _symmetric(self._data.Minv)
 
     @property
     def nle(self) -> np.ndarray:
@@ -85,11 +86,11 @@ class Configuration:
         """Velocity of the centre of mass ṙ ``(3,)`` [m/s]."""
         return self._data.vcom[0].copy()
 
-    @property
+    @cached_property
     def A_G(self) -> np.ndarray:  # noqa: N802
         """Centroidal momentum matrix ``(6, nv)``, angular rows first (2.5)."""
         A = self._data.Ag
-        return np.vstack([A[3:], A[:3]])
+        return _read_only(np.concatenate([A[3:], A[:3]]))
 
     @property
     def angular_momentum(self) -> np.ndarray:
@@ -105,23 +106,45 @@ class Configuration:
         """Centre of contact sphere ``i``: c_i ``(3,)`` [m]."""
         return self._data.oMf[self.robot.contact_frames[i]].translation.copy()
 
-    @property
+    @cached_property
     def contact_positions(self) -> np.ndarray:
         """All c_i ``(n_c, 3)`` [m]."""
-        return np.array([self._data.oMf[frame].translation for frame in self.robot.contact_frames])
+        return _read_only(np.array([self._data.oMf[frame].translation for frame in self.robot.contact_frames]))
 
     def contact_velocity(self, i: int) -> np.ndarray:
         """Velocity ċ_i ``(3,)`` [m/s]."""
         frame = self.robot.contact_frames[i]
         return pin.getFrameVelocity(self.robot.model, self._data, frame, pin.LOCAL_WORLD_ALIGNED).linear
 
+    @cached_property
+    def J_contacts(self) -> np.ndarray:  # noqa: N802
+        """Jacobians of all contact points ``(n_c, 3, nv)`` with ċ_i = J_c,i q̇."""
+        model, data, frames = self.robot.model, self._data, self.robot.contact_frames
+        return _read_only(
+            np.array([pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)[:3] for frame in frames])
+        )
+
     def J_c(self, i: int) -> np.ndarray:  # noqa: N802
-        """Contact Jacobian ``(3, nv)`` with ċ_i = J_c,i q̇."""
-        frame = self.robot.contact_frames[i]
-        return pin.getFrameJacobian(self.robot.model, self._data, frame, pin.LOCAL_WORLD_ALIGNED)[:3]
+        """Jacobian of contact point ``i`` ``(3, nv)``."""
+        return self.J_contacts[i]
 
     def Jdot_v_c(self, i: int) -> np.ndarray:  # noqa: N802
         """Bias acceleration J̇_c,i q̇ ``(3,)`` [m/s²]: the point's classical acceleration at q̈ = 0."""
         frame = self.robot.contact_frames[i]
         model, data = self.robot.model, self._data
         return pin.getFrameClassicalAcceleration(model, data, frame, pin.LOCAL_WORLD_ALIGNED).linear
+
+
+def _symmetric(upper: np.ndarray) -> np.ndarray:
+    """Return the symmetric matrix of which Pinocchio gives the upper triangle."""
+    return _read_only(np.where(_below_diagonal(len(upper)), upper.T, upper))
+
+
+@cache
+def _below_diagonal(n: int) -> np.ndarray:
+    return _read_only(np.tri(n, k=-1, dtype=bool))
+
+
+def _read_only(array: np.ndarray) -> np.ndarray:
+    array.flags.writeable = False
+    return array

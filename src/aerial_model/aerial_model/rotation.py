@@ -9,57 +9,55 @@ import numpy as np
 
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 IDENTITY.flags.writeable = False
-_SMALL = 1e-8  # [rad] below this the series of sin(x)/x is exact to rounding
+_TINY = np.finfo(float).tiny  # keeps 0 / 0 from happening where the numerator is 0 too
 
 
 def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Return the Hamilton product a ⊗ b of quaternions ``(..., 4)``, so that R(a ⊗ b) = R(a) R(b)."""
-    ax, ay, az, aw = np.moveaxis(np.asarray(a), -1, 0)
-    bx, by, bz, bw = np.moveaxis(np.asarray(b), -1, 0)
-    return np.stack(
+    ax, ay, az, aw = _components(a)
+    bx, by, bz, bw = _components(b)
+    return _along_last_axis(
         [
             aw * bx + ax * bw + ay * bz - az * by,
             aw * by - ax * bz + ay * bw + az * bx,
             aw * bz + ax * by - ay * bx + az * bw,
             aw * bw - ax * bx - ay * by - az * bz,
-        ],
-        axis=-1,
+        ]
     )
 
 
 def conjugate(q: np.ndarray) -> np.ndarray:
     """Return the inverse of unit quaternions ``(..., 4)``."""
-    return np.asarray(q) * np.array([-1.0, -1.0, -1.0, 1.0])
+    x, y, z, w = _components(q)
+    return _along_last_axis([-x, -y, -z, w])
 
 
 def exp(rotation_vector: np.ndarray) -> np.ndarray:
     """Return the quaternion ``(..., 4)`` of a rotation vector ``(..., 3)`` [rad]."""
-    phi = np.asarray(rotation_vector, dtype=float)
-    angle = np.linalg.norm(phi, axis=-1, keepdims=True)
-    scale = np.where(angle > _SMALL, np.sin(angle / 2) / np.where(angle > _SMALL, angle, 1.0), 0.5 - angle**2 / 48)
-    return np.concatenate([scale * phi, np.cos(angle / 2)], axis=-1)
+    x, y, z = _components(rotation_vector)
+    angle = np.sqrt(x * x + y * y + z * z)
+    scale = np.sin(angle / 2) / np.maximum(angle, _TINY)
+    return _along_last_axis([scale * x, scale * y, scale * z, np.cos(angle / 2)])
 
 
 def log(q: np.ndarray) -> np.ndarray:
     """Return the rotation vector ``(..., 3)`` [rad], of length at most π, of unit quaternions ``(..., 4)``."""
-    q = np.asarray(q, dtype=float)
-    q = np.where(q[..., 3:] < 0, -q, q)
-    sine = np.linalg.norm(q[..., :3], axis=-1, keepdims=True)
-    angle = 2 * np.arctan2(sine, q[..., 3:])
-    return np.where(sine > _SMALL, angle / np.where(sine > _SMALL, sine, 1.0), 2.0) * q[..., :3]
+    x, y, z, w = _components(q)
+    sine = np.sqrt(x * x + y * y + z * z)
+    scale = np.copysign(2 * np.arctan2(sine, np.abs(w)) / np.maximum(sine, _TINY), w)
+    return _along_last_axis([scale * x, scale * y, scale * z])
 
 
 def matrix(q: np.ndarray) -> np.ndarray:
     """Return the rotation matrices ``(..., 3, 3)`` of unit quaternions ``(..., 4)``."""
-    x, y, z, w = np.moveaxis(np.asarray(q, dtype=float), -1, 0)
-    return np.stack(
-        [
-            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], axis=-1),
-            np.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], axis=-1),
-            np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], axis=-1),
-        ],
-        axis=-2,
-    )
+    x, y, z, w = _components(q)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    R = np.array(rows)
+    return R if R.ndim == 2 else np.moveaxis(R, (0, 1), (-2, -1))
 
 
 def about_z(yaw: float) -> np.ndarray:
@@ -87,3 +85,15 @@ def skew(p: np.ndarray) -> np.ndarray:
     """Return the matrix ``(3, 3)`` with ``skew(p) @ x = p × x``."""
     x, y, z = p
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def _components(a: np.ndarray) -> list:
+    """Return the slices of an array along its last axis; of a single vector as floats, whose arithmetic is fastest."""
+    a = np.asarray(a, dtype=float)
+    return a.tolist() if a.ndim == 1 else list(np.moveaxis(a, -1, 0))
+
+
+def _along_last_axis(components: list) -> np.ndarray:
+    """Return components as one array, along its last axis."""
+    a = np.array(components)
+    return a if a.ndim == 1 else np.moveaxis(a, 0, -1)

@@ -76,7 +76,7 @@ class Drive:
 
 def inverse_dynamics(state: Configuration, solution: Solution) -> np.ndarray:
     """Return the joint torques ``(n,)`` [N·m], the joint rows of H q̈ + C q̇ + G − Σ J_c,iᵀ f_i, thesis (2.2)."""
-    torque = state.M[JOINT_VELOCITY] @ solution.vdot + state.nle[JOINT_VELOCITY]
-    for i in np.flatnonzero(solution.force.any(axis=1)):
-        torque -= state.J_c(i)[:, JOINT_VELOCITY].T @ solution.force[i]
-    return torque
+    J_joints = state.J_contacts[:, :, JOINT_VELOCITY].reshape(solution.force.size, -1)  # (3 n_c, n)
+    return (
+        state.M[JOINT_VELOCITY] @ solution.vdot + state.nle[JOINT_VELOCITY] - solution.force.ravel() @ J_joints
+    )

@@ -39,14 +39,16 @@ def prioritized(M_inv: np.ndarray, tasks: Iterable[Task]) -> tuple[np.ndarray, n
     nv = len(M_inv)
     command = np.zeros((nv, 2))  # columns q̈_cmd, q̇_ref
     N = np.eye(nv)  # projects on what the tasks so far leave free
+    free = nv  # dimensions of that
     for task in tasks:
         if not len(task.a):
             continue
         J_pre = task.J @ N
         J_bar, rank = consistent_inverse(J_pre, M_inv)
-        if rank == 0:
-            continue
         command = command + J_bar @ (np.column_stack([task.a, task.xdot]) - task.J @ command)
+        free -= rank
+        if free == 0:
+            break
         N = N - J_bar @ J_pre
     return command[:, 0], command[:, 1]
 
@@ -54,7 +56,19 @@ def prioritized(M_inv: np.ndarray, tasks: Iterable[Task]) -> tuple[np.ndarray, n
 def consistent_inverse(J: np.ndarray, M_inv: np.ndarray) -> tuple[np.ndarray, int]:
     """Return J^dyn = H⁻¹ Jᵀ (J H⁻¹ Jᵀ)⁺ ``(nv, m)``, thesis (3.20), and the rank of J ``(m, nv)``."""
     M_inv_Jt = M_inv @ J.T
-    eigenvalues, U = np.linalg.eigh(J @ M_inv_Jt)  # ascending
+    A = J @ M_inv_Jt
+    if _is_full_rank(A):
+        return M_inv_Jt @ np.linalg.inv(A), len(A)
+    eigenvalues, U = np.linalg.eigh(A)  # ascending
     lost = int(np.searchsorted(eigenvalues, RANK_THRESHOLD))
     U = U[:, lost:]
-    return M_inv_Jt @ ((U / eigenvalues[lost:]) @ U.T), len(eigenvalues) - lost
+    return M_inv_Jt @ ((U / eigenvalues[lost:]) @ U.T), len(A) - lost
+
+
+def _is_full_rank(A: np.ndarray) -> bool:
+    """Return whether every row of a symmetric matrix ``(m, m)`` adds to the ones before: the usual case, cheap to see."""
+    try:
+        pivots = np.linalg.cholesky(A).diagonal()
+    except np.linalg.LinAlgError:
+        return False
+    return bool(pivots.min() ** 2 > RANK_THRESHOLD)

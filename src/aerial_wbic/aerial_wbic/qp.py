@@ -82,7 +82,7 @@ class ForceOptimization:
         force = np.zeros_like(f_cmd)
         solved = True
         if len(loaded):
-            G = np.hstack([state.J_c(i)[:, BASE_TWIST].T for i in loaded])  # S_fb J_cᵀ (6, 3 n)
+            G = state.J_contacts[loaded, :, BASE_TWIST].reshape(-1, _N_BASE).T  # S_fb J_cᵀ (6, 3 n)
             f_0 = f_cmd[loaded].ravel()
             df = self._programs[len(loaded) - 1].solve(M_bb_inv @ G, M_bb_inv @ (missing + G @ f_0), f_0)
             solved = df is not None

@@ -55,10 +55,9 @@ def limb_task(state: Configuration, target: WholeBodyTarget, swinging: np.ndarra
     n_loaded = 3 * len(loaded)
     J = np.zeros((n_loaded + len(swinging), len(state.v)))
     a, xdot = np.zeros((2, len(J)))
+    J[:n_loaded] = state.J_contacts[target.contact].reshape(n_loaded, -1)
     for row, i in enumerate(loaded):
-        rows = slice(3 * row, 3 * row + 3)
-        J[rows] = state.J_c(i)
-        a[rows] = -state.Jdot_v_c(i)
+        a[3 * row : 3 * row + 3] = -state.Jdot_v_c(i)
     if len(swinging):
         gap = target.joint_position[swinging] - state.q[JOINT_POSITION][swinging]
         J[n_loaded:, JOINT_VELOCITY][np.arange(len(swinging)), swinging] = 1.0
@@ -99,5 +98,5 @@ def angular_momentum_task(state: Configuration, target: WholeBodyTarget, damping
 
 
 def attitude_error(desired: np.ndarray, actual: np.ndarray) -> np.ndarray:
-    """Return Log(R_des Rᵀ) ``(3,)`` [rad] in W, from quaternions ``(4,)``."""
+    """Return Log(R_des Rᵀ) ``(3,)`` [rad] in W, of attitudes given as quaternions ``(4,)``."""
     return rotation.log(rotation.multiply(desired, rotation.conjugate(actual)))
