@@ -55,7 +55,7 @@ def limb_task(state: Configuration, target: WholeBodyTarget, swinging: np.ndarra
     n_loaded = 3 * len(loaded)
     J = np.zeros((n_loaded + len(swinging), len(state.v)))
     a, xdot = np.zeros((2, len(J)))
-    J[:n_loaded] = state.J_contacts[target.contact].reshape(n_loaded, -1)
+    J[:n_loaded] = state.J_contacts[target.contact].reshape(J[:n_loaded].shape)
     for row, i in enumerate(loaded):
         a[3 * row : 3 * row + 3] = -state.Jdot_v_c(i)
     if len(swinging):
