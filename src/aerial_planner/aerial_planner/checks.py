@@ -15,6 +15,7 @@ from aerial_planner.transcription import Solution
 VIOLATION_TOLERANCE = 1e-4  # of any constraint of the optimization, SI units; a feasible plan may be short of optimal
 ACTUATOR_TOLERANCE = 1.05  # exact torque, voltage or speed over its limit
 ATTITUDE_TOLERANCE = np.deg2rad(3.0)  # of the finely integrated landing attitude [rad]
+TURN_TOLERANCE = np.deg2rad(15.0)  # of the rotation accumulated about the goal's axis [rad]
 RANGE_TOLERANCE = np.deg2rad(3.0)  # by which a joint may leave its planning range in flight [rad]
 EDGE_MARGIN = 0.02  # of landing feet from a platform's edge [m]
 FOOT_CLEARANCE = 0.01  # of flying feet from the ground [m]
@@ -28,6 +29,7 @@ def check(plan: Plan, schedule: Schedule, solution: Solution, use: ActuatorUse, 
     """
     _check_solution(solution)
     _check_attitude(plan, schedule)
+    _check_turn(plan, schedule)
     _check_actuators(use, plan, robot)
     _check_joint_range(plan, robot)
     _check_landing_feet(plan, robot)
@@ -70,6 +72,14 @@ def _check_attitude(plan: Plan, schedule: Schedule) -> None:
     angle = float(np.linalg.norm(miss))
     if angle > ATTITUDE_TOLERANCE:
         raise _refuse(f"landing attitude: {np.rad2deg(angle):.1f}° off the goal when the flight is integrated finely")
+
+
+def _check_turn(plan: Plan, schedule: Schedule) -> None:
+    """Check the accumulated rotation: a flip that does not turn ends in the same attitude."""
+    angle = float(np.linalg.norm(schedule.rotation))
+    turned = float(plan.rotation @ schedule.rotation / angle) if angle > 0 else float(np.linalg.norm(plan.rotation))
+    if abs(turned - angle) > TURN_TOLERANCE:
+        raise _refuse(f"rotation: {np.rad2deg(turned):.0f}° are accumulated instead of {np.rad2deg(angle):.0f}°")
 
 
 def _check_actuators(use: ActuatorUse, plan: Plan, robot: Robot) -> None:

@@ -54,6 +54,7 @@ class Reference:
     com_velocity: np.ndarray  # (N+1, 3) [m/s]
     angular_momentum: np.ndarray  # (N+1, 3) [kg·m²/s]
     orientation: np.ndarray  # (N+1, 4)
+    flight_orientation: np.ndarray  # (M+1, 4)
     joint_position: np.ndarray  # (N+1, n) [rad]
     foot_position: np.ndarray  # (n_c, 3) of the standing robot [m]
     x_0: np.ndarray  # (13 + n,) initial state r, ṙ, α, quaternion, q_j
@@ -91,11 +92,19 @@ def body_reference(
     N = len(schedule.contact)
     s = np.linspace(0.0, 1.0, N + 1)[:, None]
     com, com_velocity = _hermite(com_0, lift_off, velocity, schedule.take_off_time, s)
+    turned, turn_rate = _turn(schedule, s[:, 0])
+    turn = rotation.exp(turned[:, None] * schedule.rotation)
+    R = rotation.matrix(rotation.multiply(turn, quaternion))
+    inertia = np.asarray(model.inertia(robot.poses["home"]))
+    omega = turn_rate[:, None] * schedule.rotation
+    alpha = np.einsum("kab,bc,kdc,kd->ka", R, inertia, R, omega)
+    flight_turned = turned[-1] + (1 - turned[-1]) * np.linspace(0.0, 1.0, schedule.flight_knots + 1)
     return Reference(
         com=com,
         com_velocity=com_velocity,
-        angular_momentum=np.zeros((N + 1, 3)),
-        orientation=np.tile(quaternion, (N + 1, 1)),
+        angular_momentum=alpha,
+        orientation=rotation.multiply(turn, quaternion),
+        flight_orientation=rotation.multiply(rotation.exp(flight_turned[:, None] * schedule.rotation), quaternion),
         joint_position=np.tile(q_j, (N + 1, 1)),
         foot_position=feet,
         x_0=np.concatenate([com_0, np.zeros(6), quaternion, q_j]),
@@ -122,6 +131,20 @@ def _hermite(
     position = start + (3 * s**2 - 2 * s**3) * (end - start) + (s**3 - s**2) * duration * velocity
     rate = (6 * s - 6 * s**2) / duration * (end - start) + (3 * s**2 - 2 * s) * velocity
     return position, rate
+
+
+def _turn(schedule: Schedule, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return how much of the rotation the reference has behind it, as a share, and its rate [1/s], at s ∈ [0, 1].
+
+    The rate rises evenly from the moment that lets the share at lift-off be reached with the rate the flight needs.
+    """
+    share = schedule.rotation_at_lift_off
+    rate = (1 - share) / schedule.flight_time
+    rising = min(2 * share / rate, schedule.take_off_time) if share > 0 else schedule.take_off_time
+    time = np.clip(schedule.take_off_time * (s - 1) + rising, 0.0, None)
+    if share == 0.0:
+        return np.zeros_like(s), rate * (time / rising)
+    return share * (time / rising) ** 2, rate * (time / rising)
 
 
 def _flight_path(schedule: Schedule, robot: Robot, stretched: np.ndarray, landing: np.ndarray) -> FlightPath:

@@ -5,7 +5,7 @@ A motion is data: one YAML file in ``motions/``; no motion has code of its own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
 
@@ -29,6 +29,15 @@ class FlightRule:
 
 
 @dataclass(frozen=True, kw_only=True)
+class RotationRule:
+    """About what and how far a motion turns."""
+
+    axis: np.ndarray  # (3,) in S
+    turns: float  # where the request says nothing
+    at_lift_off: float  # share of the turn that the reference has behind it when the last contact ends
+
+
+@dataclass(frozen=True, kw_only=True)
 class Motion:
     """One motion as its YAML file says."""
 
@@ -36,6 +45,8 @@ class Motion:
     take_off: tuple  # of mappings with `contacts` (all, or names) and `duration` [s]
     flight: FlightRule
     goal: tuple  # of names of the request's numbers that may be set
+    rotation: RotationRule | None = None  # a motion that turns
+    displacement: np.ndarray = field(default_factory=lambda: np.zeros(3))  # where the request says nothing [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +58,8 @@ class Schedule:
     flight_time: float  # [s]
     flight_knots: int  # intervals the flight is integrated with
     landing_centre: np.ndarray  # (3,) of the support at landing, in S, z: the surface [m]
-    landing_yaw: float  # in S [rad]
+    rotation: np.ndarray  # (3,) to accumulate from start to touchdown, as a rotation vector in S [rad]
+    rotation_at_lift_off: float = 0.0  # share of it that the reference has behind it at lift-off
 
     @property
     def take_off_time(self) -> float:
@@ -56,8 +68,13 @@ class Schedule:
 
     @property
     def landing_orientation(self) -> np.ndarray:
-        """Attitude ``(4,)`` at touchdown: level, at the landing heading."""
-        return rotation.about_z(self.landing_yaw)
+        """Attitude ``(4,)`` at touchdown, with the sign a continuous path from no rotation arrives at."""
+        return rotation.exp(self.rotation)
+
+    @property
+    def landing_yaw(self) -> float:
+        """Heading at touchdown in S [rad]."""
+        return float(self.rotation[2])
 
 
 def motions_folder() -> Path:
@@ -98,21 +115,28 @@ def contact_schedule(
         RefusalError: if the request sets something the motion does not have.
     """
     _check_goal(request, motion)
+    rule = motion.rotation
+    turns = 0.0 if rule is None else rule.turns if request.rotation is None else request.rotation
     rows = []
     names = [point.name for point in robot.contact_points]
     for phase in motion.take_off:
-        mask = _contacts(phase["contacts"], names)
+        mask = _contacts(phase["contacts"], names, turns)
         rows += [mask] * max(1, round(float(phase["duration"]) / dt))
-    distance = float(np.linalg.norm(request.displacement[:2]))
-    height = float(request.displacement[2])
+    displacement = request.displacement if np.any(request.displacement) else motion.displacement
+    distance = float(np.linalg.norm(displacement[:2]))
+    height = float(displacement[2])
     rise = extra_rise + max(height, 0.0) + motion.flight.clearance + motion.flight.clearance_per_distance * distance
+    turn = np.array([0.0, 0.0, request.yaw])
+    if rule is not None:
+        turn = turn + 2 * np.pi * turns * rule.axis
     return Schedule(
         dt=dt,
         contact=np.array(rows),
         flight_time=flight_time(rise, height),
         flight_knots=flight_knots,
-        landing_centre=np.array(request.displacement),
-        landing_yaw=request.yaw,
+        landing_centre=np.array(displacement),
+        rotation=turn,
+        rotation_at_lift_off=0.0 if rule is None else rule.at_lift_off,
     )
 
 
@@ -130,7 +154,10 @@ def _check_goal(request: MotionRequest, motion: Motion) -> None:
             )
 
 
-def _contacts(entry: object, names: list[str]) -> np.ndarray:
+def _contacts(entry: object, names: list[str], turns: float) -> np.ndarray:
+    """Return the mask ``(n_c,)`` of a phase's contacts; an entry may differ with the sense of the turn."""
+    if isinstance(entry, dict):
+        entry = entry["positive" if turns >= 0 else "negative"]
     if entry == "all":
         return np.ones(len(names), dtype=bool)
     if not isinstance(entry, list) or any(name not in names for name in entry):

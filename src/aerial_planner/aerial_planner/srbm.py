@@ -76,7 +76,7 @@ class SingleRigidBody:
             angular_velocity=np.zeros((N, 3)),
             joint_velocity=np.zeros((N, self.robot.n_joints)),
             force=schedule.contact[..., None] * share / n_f,
-            flight_orientation=np.tile(reference.orientation[-1], (M + 1, 1)),
+            flight_orientation=reference.flight_orientation,
             flight_joint_position=reference.flight_path.at(pose, reference.flight_path.dt * np.arange(M + 1))[0],
             flight_angular_velocity=np.zeros((M, 3)),
         )
@@ -197,21 +197,11 @@ class SingleRigidBody:
         dt = schedule.flight_time / schedule.flight_knots
         p = [[dt, schedule.flight_time, settings.landing_lead], reference.landing_com, foot_ref]
         stages.append(StageData.free(p=np.concatenate(p), x=x[-1]))
-        flight = self._flight_orientations(schedule, reference.orientation[-1], reference.angular_momentum[-1])
         for k in range(1, schedule.flight_knots + 1):
             last = k == schedule.flight_knots
-            x_k = np.concatenate([reference.angular_momentum[-1], flight[k]])
+            x_k = np.concatenate([reference.angular_momentum[-1], reference.flight_orientation[k]])
             stages.append(StageData.free(p=schedule.landing_orientation if last else np.array([dt]), x=x_k))
         return stages
-
-    def _flight_orientations(self, schedule: Schedule, orientation: np.ndarray, alpha: np.ndarray) -> np.ndarray:
-        """Return the attitudes ``(M+1, 4)`` of the lumped body in free flight."""
-        dt = schedule.flight_time / schedule.flight_knots
-        attitudes = [orientation]
-        for _ in range(schedule.flight_knots):
-            omega = self.inertia_inverse @ (rotation.matrix(attitudes[-1]).T @ alpha)
-            attitudes.append(rotation.multiply(attitudes[-1], rotation.exp(omega * dt)))
-        return np.array(attitudes)
 
     def _trajectory(self, schedule: Schedule, reference: Reference, solution: Solution) -> TakeOffTrajectory:
         N = len(schedule.contact)
