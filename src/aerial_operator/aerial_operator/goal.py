@@ -50,14 +50,6 @@ def add_goal_arguments(parser: argparse.ArgumentParser) -> None:
     terrain.add_argument("--edge", metavar="D", type=finite, help="its near edge is D ahead [m] (default: as feet fit)")
 
 
-def add_planner_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the choice of planner variant."""
-    planner = parser.add_argument_group("planner")
-    planner.add_argument("--variant", metavar="KD|AAKD|AAKD*", default="AAKD*", help="of its dynamics (default: AAKD*)")
-    planner.add_argument("--no-warm-start", action="store_true", help="skip the single-rigid-body stage")
-    planner.add_argument("--solver", choices=("fatrop", "ipopt"), default="fatrop", help="(default: fatrop)")
-
-
 def request_from(args: argparse.Namespace, robot: Robot, **fields: object) -> MotionRequest:
     """Return the request that the options make; ``fields`` are further ones of it.
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 from pathlib import Path
 
 from aerial_model.errors import RefusalError
 from aerial_model.plan_file import save_plan
 from aerial_model.robot import Robot
 from aerial_operator.console import Report, pairs, percent, say
-from aerial_operator.goal import add_goal_arguments, add_planner_arguments, request_from
-from aerial_planner.planner import Planner, PlanReport
+from aerial_operator.goal import add_goal_arguments, request_from
+from aerial_operator.planning import add_planner_arguments, warm_planner
+from aerial_planner.planner import PlanReport
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,9 +25,7 @@ def run(args: argparse.Namespace) -> Report:
     """Plan on a warm planner: the building of its problems, once per process, is not counted."""
     robot = Robot.load(args.robot)
     request = request_from(args, robot, variant=args.variant, warm_start=not args.no_warm_start)
-    planner = Planner(robot, solver=args.solver)
-    with contextlib.suppress(RefusalError):  # which the plan raises again, with its figures
-        planner.warm_up(request)
+    planner = warm_planner(args, robot, request)
     try:
         result = planner.plan(request)
     except RefusalError as refusal:
@@ -41,7 +39,7 @@ def run(args: argparse.Namespace) -> Report:
 def summary(report: PlanReport) -> str:
     """Return the figures of a plan for a person."""
     landing = ", ".join(f"{x:.2f}" for x in report.landing_position_m)
-    rotation = ", ".join(f"{x:.0f}" for x in report.rotation_deg)
+    rotation = ", ".join(str(round(x)) for x in report.rotation_deg)
     return "\n".join(
         [
             _times(report),

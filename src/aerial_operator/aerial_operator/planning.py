@@ -1,0 +1,27 @@
+"""The planner that the options ask for."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+
+from aerial_model.errors import RefusalError
+from aerial_model.request import MotionRequest
+from aerial_model.robot import Robot
+from aerial_planner.planner import Planner
+
+
+def add_planner_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the choice of planner variant."""
+    planner = parser.add_argument_group("planner")
+    planner.add_argument("--variant", metavar="KD|AAKD|AAKD*", default="AAKD*", help="of its dynamics (default: AAKD*)")
+    planner.add_argument("--no-warm-start", action="store_true", help="skip the single-rigid-body stage")
+    planner.add_argument("--solver", choices=("fatrop", "ipopt"), default="fatrop", help="(default: fatrop)")
+
+
+def warm_planner(args: argparse.Namespace, robot: Robot, request: MotionRequest) -> Planner:
+    """Return a planner whose problems are built: what a user waits for a plan is what a running planner takes."""
+    planner = Planner(robot, solver=args.solver)
+    with contextlib.suppress(RefusalError):  # the plan will raise it again, with its figures
+        planner.warm_up(request)
+    return planner
