@@ -1,0 +1,54 @@
+import numpy as np
+import pytest
+
+from aerial_model import rotation
+from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION
+from aerial_model.terrain import Box, Terrain
+from aerial_sim.placement import placed_ahead
+
+AHEAD = Terrain(boxes=(Box(centre=[0.8, 0.0, 0.1], size=[0.6, 0.9, 0.2]),))
+
+
+@pytest.fixture
+def standing(robot):
+    """A robot at home, its support centre at a place, with a heading."""
+
+    def standing(origin, heading):
+        q = robot.standing_configuration()
+        turn = rotation.about_z(heading)
+        q[BASE_POSITION] = rotation.matrix(turn) @ q[BASE_POSITION] + origin
+        q[BASE_ORIENTATION] = turn
+        return q
+
+    return standing
+
+
+def test_selected_boxes_stand_ahead_of_the_robot(robot, standing):
+    terrain = placed_ahead(robot, standing([1.0, 2.0, 0.0], np.pi / 2), Terrain(), AHEAD)
+    assert len(terrain.boxes) == 1
+    np.testing.assert_allclose(terrain.boxes[0].centre, [1.0, 2.8, 0.1], atol=1e-9)
+    assert terrain.boxes[0].yaw == pytest.approx(np.pi / 2)
+
+
+def test_old_boxes_go(robot, standing):
+    far = Terrain(boxes=(Box(centre=[5.0, 0.0, 0.1], size=[0.6, 0.9, 0.2]),))
+    assert placed_ahead(robot, standing([0.0, 0.0, 0.0], 0.0), far, Terrain()).boxes == ()
+
+
+def test_the_box_under_the_robot_stays_and_new_ones_build_on_its_height(robot, standing):
+    under = Terrain(boxes=(Box(centre=[0.0, 0.0, 0.1], size=[0.9, 0.9, 0.2]),))
+    terrain = placed_ahead(robot, standing([0.0, 0.0, 0.2], 0.0), under, AHEAD)
+    assert terrain.boxes[0] is under.boxes[0]
+    assert terrain.boxes[1].top == pytest.approx(0.4)
+    assert terrain.floor == pytest.approx(0.0)
+
+
+def test_a_box_the_robot_only_overhangs_goes(robot, standing):
+    low = Terrain(boxes=(Box(centre=[0.0, 0.0, 0.05], size=[0.1, 0.1, 0.1]),))
+    assert placed_ahead(robot, standing([0.0, 0.0, 0.0], 0.0), low, Terrain()).boxes == ()
+
+
+def test_the_ground_of_a_step_down_is_there_already(robot, standing):
+    under = Terrain(boxes=(Box(centre=[0.0, 0.0, 0.1], size=[0.9, 0.9, 0.2]),))
+    step_down = Terrain(boxes=(Box(centre=[0.0, 0.0, -0.1], size=[0.9, 0.9, 0.2]),))
+    assert placed_ahead(robot, standing([0.0, 0.0, 0.2], 0.0), under, step_down).boxes == under.boxes
