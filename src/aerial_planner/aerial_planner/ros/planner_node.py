@@ -40,15 +40,15 @@ class _CancelledError(Exception):
 class PlannerNode(node.AerialNode):
     """Plans what is selected, from where the robot is believed to stand.
 
-    Parameters: ``solver`` (fatrop or ipopt), ``niceness`` of the planning thread (0 to 19), ``warm_up`` (build the
-    problems of all motions on activation), and those of every node.
+    Parameters: ``solver`` (fatrop or ipopt), ``niceness`` of the planning thread (0 to 19), ``warm_up`` (motions whose
+    problems are built on activation: names separated by commas, or ``all``), and those of every node.
     """
 
     def __init__(self, **options: Any) -> None:
         super().__init__("planner", **options)
         self.declare_parameter("solver", "fatrop")
         self.declare_parameter("niceness", 10)
-        self.declare_parameter("warm_up", True)
+        self.declare_parameter("warm_up", "all")
 
     def configure(self) -> None:
         """Load the robot, make the planner, open the interfaces."""
@@ -77,10 +77,10 @@ class PlannerNode(node.AerialNode):
         )
 
     def activate(self) -> None:
-        """Take selections from now on; build the problems of all motions meanwhile."""
+        """Take selections from now on; build the problems of motions meanwhile."""
         self._active = True
-        if self.get_parameter("warm_up").value:
-            self._worker.prepare("warming up", self._warm_up)
+        asked = self.get_parameter("warm_up").value
+        self._prepare(list(known_motions()) if asked == "all" else [name for name in asked.split(",") if name])
 
     def deactivate(self) -> None:
         """Take no more selections."""
@@ -116,13 +116,19 @@ class PlannerNode(node.AerialNode):
             lambda refusal: goal.execute(partial(_refused_preview, refusal)),
         )
 
-    def _warm_up(self) -> None:
-        for motion in known_motions():
-            try:
-                self._planner.warm_up(MotionRequest(motion=motion))
-            except AerialError as error:
-                self.get_logger().warning(f"cannot prepare {motion}: {error}")
-        self.get_logger().info(f"ready to plan for {self._robot.name}: {', '.join(known_motions())}")
+    def _prepare(self, motions: list[str]) -> None:
+        """Build the problems of motions, one after the other; a request that comes meanwhile is served in between."""
+        if motions:
+            self._worker.prepare(f"warming up for {', '.join(motions)}", partial(self._warm_up, *motions))
+        else:
+            self.get_logger().info(f"ready to plan for {self._robot.name}: {', '.join(known_motions())}")
+
+    def _warm_up(self, motion: str, *others: str) -> None:
+        try:
+            self._planner.warm_up(MotionRequest(motion=motion))
+        except AerialError as error:
+            self.get_logger().warning(f"cannot prepare {motion}: {error}")
+        self._prepare(list(others))
 
     def _plan(self, selection: MotionSelection, start: Estimate | None) -> None:
         result = self._planner.plan(selection_from_message(selection), start)

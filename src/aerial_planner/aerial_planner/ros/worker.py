@@ -6,7 +6,8 @@ import os
 import threading
 import traceback
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from queue import SimpleQueue
 
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
@@ -25,25 +26,40 @@ class Worker:
         self.activity = "idle"  # what it is at, for a person
         self._logger = logger
         self._serving = threading.Lock()
-        # On Linux the priority set is that of the calling thread alone.
-        self._thread = ThreadPoolExecutor(
-            1, "planning", lambda: os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), niceness)
-        )
+        self._tasks: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
+        self._thread = threading.Thread(target=self._run, args=[niceness], name="planning", daemon=True)
+        self._thread.start()
 
     def prepare(self, what: str, act: Callable[[], None]) -> None:
         """Do something before the next request is served."""
-        self._thread.submit(self._work, what, act, lambda fault: None)
+        self._tasks.put(partial(self._work, what, act, lambda fault: None))
 
     def serve(self, what: str, act: Callable[[], None], refuse: Callable[[RefusalError], None]) -> None:
         """Serve a request, or refuse it: at once if another is being served, later if serving it fails."""
         if not self._serving.acquire(blocking=False):
             refuse(RefusalError(RefusalCode.BUSY, "the planner is busy with another request"))
             return
-        self._thread.submit(self._work, what, act, refuse).add_done_callback(lambda _: self._serving.release())
+
+        def work() -> None:
+            try:
+                self._work(what, act, refuse)
+            finally:
+                self._serving.release()
+
+        self._tasks.put(work)
 
     def shutdown(self) -> None:
-        """Finish what is being served, drop what waits."""
-        self._thread.shutdown(cancel_futures=True)
+        """Finish what was asked for, then end."""
+        self._tasks.put(None)
+        self._thread.join()
+
+    def _run(self, niceness: int) -> None:
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), niceness)  # on Linux: of this thread alone
+        while (task := self._tasks.get()) is not None:
+            try:
+                task()
+            except Exception:  # not even an answer could be given; the next request may fare better
+                self._logger.error(traceback.format_exc())
 
     def _work(self, what: str, act: Callable[[], None], refuse: Callable[[RefusalError], None]) -> None:
         self.activity = what
