@@ -34,7 +34,6 @@ class ControllerStatus:
     """How the controller is doing; errors are plan minus estimate in W, zero while no plan is followed."""
 
     phase: Phase
-    at_rest: bool  # it stands and takes a plan
     time_in_plan: float  # [s]
     request_id: str  # of the plan that runs, or empty
     ticks: int  # measurements answered
@@ -100,8 +99,8 @@ class Controller:
         plan.checked(self.robot)
         if self._phases.plan is not None:
             raise RefusalError(RefusalCode.BUSY, f"motion '{self._phases.plan.motion}' still runs")
-        if self.estimate is None or not self._phases.at_rest:
-            raise RefusalError(RefusalCode.NOT_STANDING, f"the robot is not at rest; its phase is {self.phase.name}")
+        if self.estimate is None or self.phase is not Phase.STAND:
+            raise RefusalError(RefusalCode.NOT_STANDING, f"the robot does not stand; its phase is {self.phase.name}")
         check_start(plan, self.estimate, self.robot, self._gains)
         origin, yaw = self.robot.start_frame(self.estimate.q)
         self._phases.follow(consistent(plan, Kinematics(self.robot), self._limbs).placed(origin, yaw))
@@ -129,7 +128,6 @@ class Controller:
         plan = self._phases.plan
         return ControllerStatus(
             phase=self.phase,
-            at_rest=self._phases.at_rest,
             time_in_plan=self._phases.time_in_plan,
             request_id="" if plan is None else plan.request_id,
             ticks=self._ticks,

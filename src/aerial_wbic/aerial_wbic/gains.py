@@ -60,9 +60,8 @@ class ControllerGains:
     joint_damping: float  # rides along on the motor boards [N·m·s/rad]
     stop_damping: float  # of the joints when stopped or lying [N·m·s/rad]
     stiction_speed: float  # width of the friction feed-forward's sign change [rad/s]
-    rise_duration: float  # from the first measurement to the home height [s]
-    landing_duration: float  # shortest, from touchdown to rest [s]
-    landing_deceleration: float  # mean horizontal deceleration after touchdown; sets a longer duration [m/s²]
+    settling_rate: float  # at which motion dies away after touchdown and at the first measurement [1/s]
+    landing_depth: float  # to which the centre of mass sinks while it is caught [m]
     settle_duration: float  # from rest to readiness for the next plan [s]
     fall_tilt: float  # of the base; beyond it the robot has fallen, except in a motion [rad]
     start_joint_tolerance: float  # between a plan's first joint position and the measured one [rad]
@@ -72,7 +71,7 @@ class ControllerGains:
 
     def __post_init__(self) -> None:
         _check_not_negative(self)
-        for name in ("weight_base", "weight_force", "stiction_speed", "rise_duration", "landing_duration"):
+        for name in ("weight_base", "weight_force", "stiction_speed", "settling_rate", "landing_depth"):
             if getattr(self, name) == 0:
                 raise ValueError(f"{name} must be positive, found 0")
 

@@ -57,11 +57,6 @@ class Phases:
         self._time = 0.0
 
     @property
-    def at_rest(self) -> bool:
-        """Whether the robot stands and is done with coming to rest."""
-        return self.phase is Phase.STAND and self._hold is not None and self._time >= self._hold.end
-
-    @property
     def time_in_plan(self) -> float:
         """Time since the plan that runs began [s]; 0 when none does."""
         return 0.0 if self._begin is None else self._time - self._begin
@@ -129,14 +124,15 @@ class Phases:
         return self._hold.at(self._time, state)
 
     def _begin_hold(self, state: Configuration) -> Hold:
-        """Return the way to rest; after a landing the faster the robot moves, the longer it may take."""
         gains = self._gains
-        if self.phase is Phase.STAND:
-            duration = gains.rise_duration
-        else:
-            speed = float(np.linalg.norm(state.com_velocity[:2]))
-            duration = max(gains.landing_duration, speed / gains.landing_deceleration)
-        return Hold(state, self._time, duration, self._com_height - self._foot_radius, gains.hold)
+        return Hold(
+            state,
+            self._time,
+            rate=gains.settling_rate,
+            com_height=self._com_height - self._foot_radius,
+            depth=gains.landing_depth,
+            gains=gains.hold,
+        )
 
     def _end_plan(self) -> None:
         self.plan = self._begin = None

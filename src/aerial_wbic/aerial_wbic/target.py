@@ -13,8 +13,8 @@ from aerial_model import plan as plans
 from aerial_model import rotation
 from aerial_model.kinematics import Configuration
 from aerial_model.robot import BASE_ANGULAR, BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY
-from aerial_wbic.blend import Blend
 from aerial_wbic.gains import BodyGains
+from aerial_wbic.settling import Settling
 
 GRAVITY = np.array([0.0, 0.0, -9.81])  # in W [m/s²]
 GRAVITY.flags.writeable = False
@@ -75,30 +75,43 @@ def from_plan(sample: plans.Target, gains: BodyGains) -> WholeBodyTarget:
 class Hold:
     """Comes to rest, level, over the centre of the support, and stays there.
 
-    All contact points are taken to be on the ground. The way to rest is a blend of the centre of mass *relative to the
-    centre of its support* and of the attitude, from how the robot moves at the beginning: neither an early nor a late
-    touchdown makes the error jump.
+    All contact points are taken to be on the ground. The way to rest is one of the centre of mass *relative to the centre
+    of its support* and of the attitude, from how the robot moves at the beginning: neither an early nor a late touchdown
+    makes the error jump. A fall is caught within a given depth; forward speed is braked while the feet bear that load,
+    which is when friction can.
 
     Args:
         state: of the robot at the beginning.
         time: of the beginning [s].
-        duration: to rest [s].
+        rate: at which motion dies away [1/s]; the vertical one faster where the depth asks for it.
         com_height: of the centre of mass above the centre of the contact spheres, at rest [m].
+        depth: to which a fall is caught [m].
         gains: of the base task.
     """
 
-    def __init__(self, state: Configuration, time: float, duration: float, com_height: float, gains: BodyGains) -> None:
+    def __init__(
+        self,
+        state: Configuration,
+        time: float,
+        *,
+        rate: float,
+        com_height: float,
+        depth: float,
+        gains: BodyGains,
+    ) -> None:
         self._gains = gains
         self._begin = time
-        self.end = time + duration
-        rest = np.array([0.0, 0.0, com_height])
-        self._offset = Blend(state.com - support_centre(state), state.com_velocity, rest, duration)
+        velocity = state.com_velocity
+        rates = np.array([rate, rate, max(rate, Settling.REACH * abs(velocity[2]) / depth)])
+        offset = state.com - support_centre(state)
+        self._offset = Settling(offset, velocity, np.array([0.0, 0.0, com_height]), rates)
         # The attitude as a rotation vector from the level attitude of the present heading.
         self._level = rotation.about_z(rotation.heading(state.base_orientation))
         tilt = rotation.log(rotation.multiply(state.base_orientation, rotation.conjugate(self._level)))
-        self._tilt = Blend(tilt, state.R_WB @ state.v[BASE_ANGULAR], np.zeros(3), duration)
+        self._tilt = Settling(tilt, state.R_WB @ state.v[BASE_ANGULAR], np.zeros(3), rate)
         self._contact = np.ones(state.robot.n_contacts, dtype=bool)
         self._zeros = np.zeros(state.robot.n_joints)
+        self.end = time + Settling.TIME / rate
 
     def at(self, time: float, state: Configuration) -> WholeBodyTarget:
         """Return the target at ``time`` [s] of a robot at ``state``."""
