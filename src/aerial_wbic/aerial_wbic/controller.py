@@ -12,10 +12,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from aerial_model import rotation
 from aerial_model.errors import RefusalCode, RefusalError
 from aerial_model.kinematics import Configuration, Kinematics
 from aerial_model.plan import Plan
-from aerial_model.robot import Robot
+from aerial_model.robot import BASE_ORIENTATION, Robot
 from aerial_model.state import Command, Estimate, Measurement
 from aerial_wbic.acceptance import check_start
 from aerial_wbic.consistency import consistent
@@ -23,15 +24,15 @@ from aerial_wbic.drive import Drive
 from aerial_wbic.estimator import Estimator
 from aerial_wbic.gains import ControllerGains
 from aerial_wbic.hierarchy import prioritized
-from aerial_wbic.phase import DAMPED, FOLLOWING, Phase, Phases
+from aerial_wbic.phase import FOLLOWING, Phase, Phases
 from aerial_wbic.qp import ForceOptimization
-from aerial_wbic.target import WholeBodyTarget
+from aerial_wbic.target import PostureTarget, WholeBodyTarget
 from aerial_wbic.tasks import Limbs, attitude_error, prioritized_tasks
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ControllerStatus:
-    """How the controller is doing; errors are plan minus estimate in W, zero while no plan is followed."""
+    """How the controller is doing; errors are plan minus estimate in the start heading frame, zero while no plan is followed."""
 
     phase: Phase
     time_in_plan: float  # [s]
@@ -70,7 +71,7 @@ class Controller:
         self._estimator.reset()
         self._phases = Phases(self.robot, self._gains, self._home_height)
         self._drive = Drive(self.robot, self._gains)
-        self._now: tuple[Configuration, WholeBodyTarget] | None = None  # what the last tick saw and wanted
+        self._now: tuple[Configuration, WholeBodyTarget | PostureTarget | None] | None = None  # what the last tick saw and wanted
         self.estimate: Estimate | None = None  # in the odom frame; None before the first measurement
         self._ticks = self._fallback_ticks = 0
 
@@ -80,13 +81,13 @@ class Controller:
         self._phases.tick(measurement.time)
         self.estimate = self._estimator.update(measurement, self._phases.contacts())
         state = self._kinematics.at(self.estimate.q, self.estimate.v)
-        if self._phases.judge(state) in DAMPED:
-            return self._drive.damped(measurement)
         target = self._phases.target(state)
+        self._now = (state, target)
+        if not isinstance(target, WholeBodyTarget):
+            return self._drive.resting(target, measurement)
         vdot_cmd, v_ref = prioritized(state.M_inv, prioritized_tasks(state, target, self._limbs, self._gains))
         solution = self._qp.solve(state, vdot_cmd, target.force, target.contact)
         self._fallback_ticks += not solution.solved
-        self._now = (state, target)
         return self._drive.command(state, solution, v_ref, measurement)
 
     def accept(self, plan: Plan) -> None:
@@ -102,8 +103,9 @@ class Controller:
         if self.estimate is None or self.phase is not Phase.STAND:
             raise RefusalError(RefusalCode.NOT_STANDING, f"the robot does not stand; its phase is {self.phase.name}")
         check_start(plan, self.estimate, self.robot, self._gains)
-        origin, yaw = self.robot.start_frame(self.estimate.q)
-        self._phases.follow(consistent(plan, Kinematics(self.robot), self._limbs).placed(origin, yaw))
+        origin, self._start_heading = self.robot.start_frame(self.estimate.q)
+        plan = consistent(plan, Kinematics(self.robot), self._limbs)
+        self._phases.follow(plan.placed(origin, self._start_heading))
 
     def abort(self) -> None:
         """Call off the motion that runs and come to rest, as long as every foot is on the ground.
@@ -113,6 +115,24 @@ class Controller:
         """
         self._phases.abort()
 
+    def lie_down(self) -> None:
+        """Sink to the ground and let the joints go.
+
+        Raises:
+            RefusalError: if the robot does not stand.
+        """
+        self._phases.lie_down()
+
+    def stand_up(self) -> None:
+        """Fold the legs under the body and rise.
+
+        Raises:
+            RefusalError: if the robot does not lie, or lies too far on its side.
+        """
+        if self.estimate is not None and rotation.tilt(self.estimate.q[BASE_ORIENTATION]) > self._gains.fall_tilt:
+            raise RefusalError(RefusalCode.FELL, "the robot lies on its side or back: set it on its belly first")
+        self._phases.stand_up()
+
     def stop(self) -> None:
         """Emergency stop: joints are only damped until ``reset``."""
         self._phases.stop()
@@ -121,6 +141,11 @@ class Controller:
     def phase(self) -> Phase:
         """What the controller is doing."""
         return self._phases.phase
+
+    @property
+    def settled(self) -> bool:
+        """Whether nothing is under way: the robot stands, lies, or is stopped."""
+        return self._phases.settled
 
     @property
     def status(self) -> ControllerStatus:
@@ -133,16 +158,17 @@ class Controller:
             ticks=self._ticks,
             saturated_ticks=self._drive.saturated_ticks,
             fallback_ticks=self._fallback_ticks,
-            **(self._errors() if self.phase in FOLLOWING and self._now else {}),
+            **(self._errors() if self.phase in FOLLOWING and self._phases.time_in_plan > 0 else {}),
         )
 
     def _errors(self) -> dict[str, np.ndarray]:
         state, target = self._now
+        R_SW = rotation.matrix(rotation.about_z(-self._start_heading))
         return {
-            "com_error": target.body.com - state.com,
-            "com_velocity_error": target.body.com_velocity - state.com_velocity,
-            "orientation_error": attitude_error(target.body.orientation, state.base_orientation),
-            "angular_momentum_error": target.angular_momentum - state.angular_momentum,
+            "com_error": R_SW @ (target.body.com - state.com),
+            "com_velocity_error": R_SW @ (target.body.com_velocity - state.com_velocity),
+            "orientation_error": R_SW @ attitude_error(target.body.orientation, state.base_orientation),
+            "angular_momentum_error": R_SW @ (target.angular_momentum - state.angular_momentum),
         }
 
 

@@ -9,6 +9,7 @@ from aerial_model.robot import JOINT_VELOCITY, Robot
 from aerial_model.state import Command, Measurement
 from aerial_wbic.gains import ControllerGains
 from aerial_wbic.qp import Solution
+from aerial_wbic.target import PostureTarget
 
 
 class Drive:
@@ -24,6 +25,7 @@ class Drive:
         n = robot.n_joints
         self._zeros = np.zeros(n)
         self._joint_damping = np.full(n, gains.joint_damping)
+        self._posture_stiffness = np.full(n, gains.posture_stiffness)
         self._stop_damping = np.full(n, gains.stop_damping)
         self.saturated_ticks = 0
 
@@ -55,13 +57,13 @@ class Drive:
         self._count(command, measurement)
         return command
 
-    def damped(self, measurement: Measurement) -> Command:
-        """Return the command of a robot that is stopped: its joints only resist motion."""
+    def resting(self, posture: PostureTarget | None, measurement: Measurement) -> Command:
+        """Return the command of a robot that does not stand: joints go to a posture, or only resist motion."""
         return Command(
             torque=self._zeros,
-            position=measurement.joint_position,
-            velocity=self._zeros,
-            stiffness=self._zeros,
+            position=measurement.joint_position if posture is None else posture.joint_position,
+            velocity=self._zeros if posture is None else posture.joint_velocity,
+            stiffness=self._zeros if posture is None else self._posture_stiffness,
             damping=self._stop_damping,
             state_time=measurement.time,
             state_sequence=measurement.sequence,

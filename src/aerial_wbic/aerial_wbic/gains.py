@@ -58,11 +58,13 @@ class ControllerGains:
     weight_base: float  # Q_1 of (3.24) [1/(m/s²)²]
     weight_force: float  # Q_2 of (3.24) [1/N²]
     joint_damping: float  # rides along on the motor boards [N·m·s/rad]
+    posture_stiffness: float  # of the joints while the legs are folded to stand up [N·m/rad]
     stop_damping: float  # of the joints when stopped or lying [N·m·s/rad]
     stiction_speed: float  # width of the friction feed-forward's sign change [rad/s]
     settling_rate: float  # at which motion dies away after touchdown and at the first measurement [1/s]
     landing_depth: float  # to which the centre of mass sinks while it is caught [m]
-    settle_duration: float  # from rest to readiness for the next plan [s]
+    lying_height: float  # of the centre of mass above the ground where the joints are let go [m]
+    lying_rate: float  # at which the robot sinks to it, and at which it folds its legs [1/s]
     fall_tilt: float  # of the base; beyond it the robot has fallen, except in a motion [rad]
     start_joint_tolerance: float  # between a plan's first joint position and the measured one [rad]
     start_tilt_tolerance: float  # between a plan's first base attitude and the estimated one [rad]
@@ -71,7 +73,7 @@ class ControllerGains:
 
     def __post_init__(self) -> None:
         _check_not_negative(self)
-        for name in ("weight_base", "weight_force", "stiction_speed", "settling_rate", "landing_depth"):
+        for name in ("weight_base", "weight_force", "stiction_speed", "settling_rate", "landing_depth", "lying_rate"):
             if getattr(self, name) == 0:
                 raise ValueError(f"{name} must be positive, found 0")
 

@@ -1,11 +1,12 @@
 """Which phase the robot is in, which points carry load in it, and what the target is then.
 
-Phases follow each other by time alone, as in the thesis (chapter 4): take-off and flight as planned, landing from the
-planned touchdown until the robot has come to rest, then standing.
+The phases of a motion follow each other by time alone, as in the thesis (chapter 4): take-off and flight as planned,
+landing from the planned touchdown until the robot has come to rest, then standing. Lying down and standing up are told.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import IntEnum
 
 import numpy as np
@@ -16,27 +17,25 @@ from aerial_model.kinematics import Configuration
 from aerial_model.plan import Plan
 from aerial_model.robot import Robot
 from aerial_wbic.gains import ControllerGains
-from aerial_wbic.target import Hold, WholeBodyTarget, from_plan
+from aerial_wbic.target import Fold, Hold, PostureTarget, WholeBodyTarget, from_plan
 
 
 class Phase(IntEnum):
     """What the controller is doing; the numbers are those of ``ControllerStatus``."""
 
-    LIE = 0  # on the ground, joints damped
+    LIE = 0  # on its way to the ground or on it; joints damped in the end
     STAND = 1  # balanced on all contact points; takes plans
     TAKE_OFF = 2  # on the ground, following a plan
     FLIGHT = 3  # no contact planned
-    LANDING = 4  # touched down, coming to rest
+    LANDING = 4  # touched down or getting up, coming to rest
     STOPPED = 5  # emergency stop, until reset
 
 
 FOLLOWING = (Phase.TAKE_OFF, Phase.FLIGHT)  # a plan gives the target
-HOLDING = (Phase.LANDING, Phase.STAND)  # rest over the support is the target
-DAMPED = (Phase.LIE, Phase.STOPPED)  # there is no target
 
 
 class Phases:
-    """The order of events: stands first, then whatever it is told.
+    """The order of events: it stands first, then does what it is told.
 
     Args:
         robot: the robot.
@@ -47,23 +46,34 @@ class Phases:
     def __init__(self, robot: Robot, gains: ControllerGains, com_height: float) -> None:
         self.phase = Phase.STAND
         self.plan: Plan | None = None  # the one that runs, in W
+        self._robot = robot
         self._gains = gains
         self._com_height = com_height
         self._foot_radius = float(np.mean([point.radius for point in robot.contact_points]))
         self._all_points = np.ones(robot.n_contacts, dtype=bool)
         self._no_point = np.zeros(robot.n_contacts, dtype=bool)
-        self._begin: float | None = None  # of the plan [s]
-        self._hold: Hold | None = None
         self._time = 0.0
+        self._plan_begin: float | None = None  # [s]
+        self._way: Hold | Fold | None = None  # to rest; None: a plan is followed or joints are damped
+        self._next_way: Callable[[Configuration], Hold | Fold] | None = self._to_stance  # from the next tick on
 
     @property
     def time_in_plan(self) -> float:
         """Time since the plan that runs began [s]; 0 when none does."""
-        return 0.0 if self._begin is None else self._time - self._begin
+        return 0.0 if self._plan_begin is None else self._time - self._plan_begin
+
+    @property
+    def settled(self) -> bool:
+        """Whether nothing is under way: it stands, lies, or is stopped."""
+        if self.phase is Phase.LIE:
+            return self._way is None and self._next_way is None
+        return self.phase in (Phase.STAND, Phase.STOPPED)
+
+    # --- what it is told ---------------------------------------------------------------------------------------------
 
     def follow(self, plan: Plan) -> None:
         """Follow ``plan``, expressed in W, from the next tick on."""
-        self.plan, self._begin = plan, None
+        self.plan, self._plan_begin = plan, None
         self.phase = Phase.TAKE_OFF
 
     def abort(self) -> None:
@@ -73,28 +83,48 @@ class Phases:
             RefusalError: if there is nothing to call off, or it is too late.
         """
         if self.phase is not Phase.TAKE_OFF:
-            raise RefusalError(RefusalCode.NOT_STANDING, f"nothing to abort on the ground: the phase is {self.phase.name}")
+            raise RefusalError(RefusalCode.INVALID_REQUEST, f"nothing to abort on the ground: {self._doing()}")
         if not self.contacts().all():
             raise RefusalError(RefusalCode.BUSY, "too late to abort: a foot has left the ground")
         self._end_plan()
-        self.phase, self._hold = Phase.STAND, None
+        self.phase, self._next_way = Phase.LANDING, self._to_stance
+
+    def lie_down(self) -> None:
+        """Sink to the ground and let the joints go.
+
+        Raises:
+            RefusalError: if it does not stand.
+        """
+        if self.phase is not Phase.STAND:
+            raise RefusalError(RefusalCode.NOT_STANDING, f"to lie down it must stand: {self._doing()}")
+        self.phase, self._next_way = Phase.LIE, self._to_ground
+
+    def stand_up(self) -> None:
+        """Fold the legs under the body and rise.
+
+        Raises:
+            RefusalError: if it does not lie.
+        """
+        if self.phase is not Phase.LIE or not self.settled:
+            raise RefusalError(RefusalCode.INVALID_REQUEST, f"to stand up it must lie: {self._doing()}")
+        self._next_way = self._to_folded
 
     def stop(self) -> None:
         """Stop until reset: joints are only damped from the next tick on."""
-        self.phase = Phase.STOPPED
-        self._end_plan()
+        self._let_go(Phase.STOPPED)
+
+    # --- what happens by itself --------------------------------------------------------------------------------------
 
     def tick(self, time: float) -> None:
         """Let it be ``time`` [s]; a plan that was accepted begins now, one that runs goes on to its next phase."""
         self._time = time
         if self.phase not in FOLLOWING:
             return
-        if self._begin is None:
-            self._begin = time
+        if self._plan_begin is None:
+            self._plan_begin = time
         if self.time_in_plan >= self.plan.landing_time:
-            self.phase = Phase.LANDING
             self._com_height = self.plan.landing_com_height
-            self._hold = None
+            self.phase, self._next_way = Phase.LANDING, self._to_stance
         elif self.time_in_plan >= self.plan.take_off_time:
             self.phase = Phase.FLIGHT
 
@@ -104,35 +134,60 @@ class Phases:
             return self.plan.sample(self.time_in_plan).contact
         return self._no_point if self.phase is Phase.FLIGHT else self._all_points
 
-    def judge(self, state: Configuration) -> Phase:
-        """Return the phase, seen where the robot is: one that fell lies, one that came to rest stands."""
-        if self.phase in HOLDING:
-            if rotation.tilt(state.base_orientation) > self._gains.fall_tilt:
-                self.phase = Phase.LIE
-                self._end_plan()
-            elif self._hold is None:
-                self._hold = self._begin_hold(state)
-            elif self.phase is Phase.LANDING and self._time >= self._hold.end + self._gains.settle_duration:
-                self.phase = Phase.STAND
-                self._end_plan()
-        return self.phase
-
-    def target(self, state: Configuration) -> WholeBodyTarget:
-        """Return what to do now, in a phase that has a target."""
+    def target(self, state: Configuration) -> WholeBodyTarget | PostureTarget | None:
+        """Return what to do now, seen where the robot is; None: nothing but to damp the joints."""
         if self.phase in FOLLOWING:
             return from_plan(self.plan.sample(self.time_in_plan), self._gains.follow)
-        return self._hold.at(self._time, state)
+        if self._next_way is not None:
+            self._way, self._next_way = self._next_way(state), None
+        if isinstance(self._way, Hold) and rotation.tilt(state.base_orientation) > self._gains.fall_tilt:
+            self._let_go(Phase.LIE)
+        if self._way is None:
+            return None
+        if self._time >= self._way.end:
+            self._arrive(state)
+        return None if self._way is None else self._way.at(self._time, state)
 
-    def _begin_hold(self, state: Configuration) -> Hold:
-        gains = self._gains
+    def _arrive(self, state: Configuration) -> None:
+        """Go on to what follows the way that is at its end."""
+        if self.phase is Phase.LANDING and self._way.reached(state):
+            self.phase = Phase.STAND
+            self._end_plan()
+        elif self.phase is Phase.LANDING:
+            self._let_go(Phase.LIE)
+        elif self.phase is Phase.LIE and isinstance(self._way, Fold):
+            self.phase, self._way = Phase.LANDING, self._to_stance(state)
+        elif self.phase is Phase.LIE:
+            self._let_go(Phase.LIE)
+
+    def _let_go(self, phase: Phase) -> None:
+        self.phase = phase
+        self._way = self._next_way = None
+        self._end_plan()
+
+    def _end_plan(self) -> None:
+        self.plan = self._plan_begin = None
+
+    def _doing(self) -> str:
+        return f"the phase is {self.phase.name}"
+
+    # --- ways to rest ------------------------------------------------------------------------------------------------
+
+    def _to_stance(self, state: Configuration) -> Hold:
+        return self._hold(state, self._com_height, self._gains.settling_rate)
+
+    def _to_ground(self, state: Configuration) -> Hold:
+        return self._hold(state, self._gains.lying_height, self._gains.lying_rate)
+
+    def _hold(self, state: Configuration, com_height: float, rate: float) -> Hold:
         return Hold(
             state,
             self._time,
-            rate=gains.settling_rate,
-            com_height=self._com_height - self._foot_radius,
-            depth=gains.landing_depth,
-            gains=gains.hold,
+            rate=rate,
+            com_height=com_height - self._foot_radius,
+            depth=self._gains.landing_depth,
+            gains=self._gains.hold,
         )
 
-    def _end_plan(self) -> None:
-        self.plan = self._begin = None
+    def _to_folded(self, state: Configuration) -> Fold:
+        return Fold(state, self._time, rate=self._gains.lying_rate, pose=self._robot.poses["tuck"])

@@ -18,6 +18,7 @@ from aerial_wbic.settling import Settling
 
 GRAVITY = np.array([0.0, 0.0, -9.81])  # in W [m/s²]
 GRAVITY.flags.writeable = False
+REST_TOLERANCE = 0.2  # of the height at rest: farther off, something keeps the robot from standing
 _WRENCH_REGULARIZATION = 1e-6  # [m²] keeps the share of the load defined when the support is a line or a point
 
 
@@ -46,6 +47,14 @@ class WholeBodyTarget:
     angular_momentum_rate: np.ndarray  # (3,) [N·m]
     force: np.ndarray  # f_cmd (n_c, 3) in W [N]
     contact: np.ndarray  # (n_c,) bool
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PostureTarget:
+    """Joint positions, for a robot that lies and has nothing to balance."""
+
+    joint_position: np.ndarray  # (n,) [rad]
+    joint_velocity: np.ndarray  # (n,) [rad/s]
 
 
 def from_plan(sample: plans.Target, gains: BodyGains) -> WholeBodyTarget:
@@ -104,7 +113,8 @@ class Hold:
         velocity = state.com_velocity
         rates = np.array([rate, rate, max(rate, Settling.REACH * abs(velocity[2]) / depth)])
         offset = state.com - support_centre(state)
-        self._offset = Settling(offset, velocity, np.array([0.0, 0.0, com_height]), rates)
+        self._rest = np.array([0.0, 0.0, com_height])
+        self._offset = Settling(offset, velocity, self._rest, rates)
         # The attitude as a rotation vector from the level attitude of the present heading.
         self._level = rotation.about_z(rotation.heading(state.base_orientation))
         tilt = rotation.log(rotation.multiply(state.base_orientation, rotation.conjugate(self._level)))
@@ -112,6 +122,10 @@ class Hold:
         self._contact = np.ones(state.robot.n_contacts, dtype=bool)
         self._zeros = np.zeros(state.robot.n_joints)
         self.end = time + Settling.TIME / rate
+
+    def reached(self, state: Configuration) -> bool:
+        """Return whether the centre of mass is where it is to rest, give or take a part of its height."""
+        return bool(np.linalg.norm(state.com - support_centre(state) - self._rest) < REST_TOLERANCE * self._rest[2])
 
     def at(self, time: float, state: Configuration) -> WholeBodyTarget:
         """Return the target at ``time`` [s] of a robot at ``state``."""
@@ -136,6 +150,27 @@ class Hold:
             force=shared_load(state, acceleration),
             contact=self._contact,
         )
+
+
+class Fold:
+    """Brings the legs from where they are to a pose, as fast as the poles of ``Settling`` let it.
+
+    Args:
+        state: of the robot at the beginning.
+        time: of the beginning [s].
+        rate: at which the distance dies away [1/s].
+        pose: joint positions ``(n,)`` [rad].
+    """
+
+    def __init__(self, state: Configuration, time: float, *, rate: float, pose: np.ndarray) -> None:
+        self._begin = time
+        self._joints = Settling(state.q[JOINT_POSITION], state.v[JOINT_VELOCITY], pose, rate)
+        self.end = time + Settling.TIME / rate
+
+    def at(self, time: float, state: Configuration) -> PostureTarget:
+        """Return the target at ``time`` [s]; where the robot is does not matter."""
+        position, velocity, _ = self._joints.at(time - self._begin)
+        return PostureTarget(joint_position=position, joint_velocity=velocity)
 
 
 def support_centre(state: Configuration) -> np.ndarray:
