@@ -1,0 +1,47 @@
+"""Whole jumps in closed loop: planner, controller and simulator with nominal noise, judged from ground truth."""
+
+import numpy as np
+import pytest
+
+from aerial_evaluation.closed_loop import run
+from aerial_model.errors import RefusalError
+from aerial_model.request import MotionRequest
+from aerial_model.robot import Robot
+from aerial_planner.planner import Planner
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return Robot.load("mini_cheetah")
+
+
+@pytest.fixture(scope="module")
+def planner(robot):
+    return Planner(robot)
+
+
+def jump(robot, *displacement):
+    request = MotionRequest(motion="jump", displacement=np.array(displacement))
+    return request.with_platform(robot) if displacement[2] else request
+
+
+@pytest.mark.parametrize(
+    "displacement",
+    [(0.4, 0.0, 0.0), (-0.2, 0.0, 0.0), (0.0, 0.2, 0.0), (0.6, 0.0, 0.16), (0.6, 0.0, -0.1)],
+    ids=["forward", "backward", "left", "onto a platform", "off a platform"],
+)
+def test_a_jump_lands(robot, planner, displacement):
+    outcome = run(robot, jump(robot, *displacement), seed=1, planner=planner)
+    assert outcome.landing.failed == ()
+
+
+def test_equal_seeds_give_equal_runs_to_the_last_bit(robot, planner):
+    first, second = (run(robot, jump(robot, 0.3, 0.0, 0.0), seed=2, planner=planner) for _ in range(2))
+    for one, other in zip(first.ticks, second.ticks, strict=True):
+        np.testing.assert_array_equal(one.truth.q, other.truth.q)
+        np.testing.assert_array_equal(one.truth.requested_torque, other.truth.requested_torque)
+
+
+def test_a_goal_out_of_reach_is_refused(robot, planner):
+    with pytest.raises(RefusalError):
+        run(robot, jump(robot, 3.0, 0.0, 0.0), planner=planner)
