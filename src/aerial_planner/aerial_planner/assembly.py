@@ -46,8 +46,7 @@ def assemble(
     nearest that satisfy A_G q̇ = [α; m ṙ] and J_c q̇ = 0 exactly.
     """
     N = len(schedule.contact)
-    rates = np.vstack([take_off.joint_velocity, take_off.joint_velocity[-1:]])  # (N+1, n)
-    omega = np.vstack([take_off.angular_velocity, take_off.angular_velocity[-1:]])
+    rates, omega = take_off.joint_velocity, take_off.angular_velocity
     momentum = np.hstack([robot.mass * take_off.com_velocity, take_off.angular_momentum])  # linear first
     q = _configurations(model, take_off.com, take_off.orientation, take_off.joint_position)
     data = robot.model.createData()

@@ -5,8 +5,12 @@ are the state; body rate ω, joint rates q̇_j and forces f the control. The bas
 by construction; accelerations and α̇ are expressions. What stays are the momentum agreement (3.8) and the fixed feet
 (3.9a), as equalities of a knot.
 
-    take-off knot   x = [r, ṙ, α, quaternion, q_j],   u = [ω, q̇_j, f of the loaded contacts]
-    flight knot     x = [α, quaternion, q_j],         u = [ω]
+    take-off knot   x = [r, ṙ, α, quaternion, q_j, q̇_j of the knot before],   u = [ω, q̇_j, f of the loaded contacts]
+    flight knot     x = [α, quaternion, q_j],                                u = [ω]
+
+The rates of the knot before give the joint accelerations: the torque limits then hold for −Jᵀf *and* the inertia of the
+legs, whose mass matrix is taken at the home pose. With (3.14) alone, which neglects it, unloaded legs whip around for
+free and the last force before lift-off becomes an impulse that no leg could follow.
 
 In flight the legs follow a given path from the take-off pose through the tuck to the landing pose and turn the body
 against them; because these knots are in the problem, the attitude at touchdown is the goal's, legs included.
@@ -21,7 +25,8 @@ import casadi as ca
 import numpy as np
 
 from aerial_model.contact import friction_pyramid
-from aerial_model.robot import Robot
+from aerial_model.kinematics import Kinematics
+from aerial_model.robot import JOINT_VELOCITY, Robot
 from aerial_planner.reference import Reference
 from aerial_planner.schedule import GRAVITY, Schedule
 from aerial_planner.settings import PlannerSettings
@@ -61,6 +66,7 @@ class KinoDynamic:
         self.settings = settings
         self.variant = variant
         self.options = options
+        self._joint_inertia = _joint_inertia(robot)
         self._problems: dict[bytes, Problem] = {}
         self._kinds: dict[tuple, StageKind] = {}
 
@@ -103,6 +109,7 @@ class KinoDynamic:
             + w.joint_position * ca.sumsqr(dq)
             + w.angular_velocity * ca.sumsqr(s.omega)
             + w.joint_velocity * ca.sumsqr(s.dq_j)
+            + w.joint_acceleration * ca.sumsqr(s.ddq_j)
             + w.force * ca.sumsqr(s.f)
         )
 
@@ -130,23 +137,24 @@ class KinoDynamic:
         return kind
 
     def _actuator_rows(self, rows: Rows, s: _TakeOffSymbols, loaded: tuple[bool, ...]) -> None:
-        """Add torque and voltage limits (3.11b, c) of the joints that carry loaded contacts, with τ of (3.14)."""
-        robot, law = self.robot, self.robot.actuators
-        q_j = s.q_j
+        """Add torque and voltage limits (3.11b, c) of all joints, with τ of (3.14) plus the inertia of the joints."""
+        robot, q_j = self.robot, s.q_j
         if self.variant is Variant.AAKD_STAR:
             frozen = ca.DM(robot.frozen_joints.astype(float))
             q_j = frozen * s.q_j_frozen + (1 - frozen) * s.q_j
         J = self.model.foot_jacobians(q_j)  # (3 n_c, n) in B
-        torque = ca.SX(robot.n_joints, 1)
+        torque = ca.DM(self._joint_inertia) @ s.ddq_j
         for i in np.flatnonzero(loaded):
             torque -= J[3 * i : 3 * i + 3, :].T @ (s.R.T @ s.force[i])  # (3.14)
-        share = self.settings.margin
-        for joint in range(robot.n_joints):
-            if torque[joint].is_zero():
-                continue
-            rows.between(f"{robot.joint_names[joint]} torque", torque[joint] / law.torque_max[joint], -share, share)  # (3.11b)
+        self._limit_rows(rows, s, torque)
+
+    def _limit_rows(self, rows: Rows, s: _TakeOffSymbols, torque: ca.SX) -> None:
+        """Add the limits of torque (3.11b) and of the voltage it needs at the joint rates (3.11c)."""
+        law, share = self.robot.actuators, self.settings.margin
+        for joint, name in enumerate(self.robot.joint_names):
+            rows.between(f"{name} torque", torque[joint] / law.torque_max[joint], -share, share)
             volts = law.volts_per_torque[joint] * torque[joint] + law.volts_per_speed[joint] * s.dq_j[joint]
-            rows.between(f"{robot.joint_names[joint]} voltage", volts / law.bus_voltage[joint], -share, share)  # (3.11c)
+            rows.between(f"{name} voltage", volts / law.bus_voltage[joint], -share, share)
 
     def _lift_off_kind(self, touching: tuple[bool, ...]) -> StageKind:
         """Return the knot at which the last contact ends: the ballistic path from here ends at the goal."""
@@ -164,7 +172,20 @@ class KinoDynamic:
         rows.equal("landing position", landing + lead - s.landing_com)
         flight = _FlightSymbols(robot, s.alpha, s.quaternion, s.q_j, s.omega, s.flight_p)
         rows.equal("momentum", flight.momentum_gap(self.model))
-        kind = rows.stage("lift_off", s.x, s.u, s.p, self.settings.weights.angular_velocity * ca.sumsqr(s.omega), flight.step())
+        # The rates at which the feet leave the ground: without them the last force could be an impulse no leg follows.
+        rows.equal("momentum", s.R.T @ s.alpha - self.model.angular_momentum(s.q_j, s.omega_ground, s.dq_j))
+        for i, slip in enumerate(_foot_velocities(self.model, s)):
+            if touching[i]:
+                rows.equal("feet", slip)
+        if self.variant is not Variant.KD:
+            self._limit_rows(rows, s, ca.DM(self._joint_inertia) @ s.ddq_j)
+        w = self.settings.weights
+        cost = (
+            w.angular_velocity * ca.sumsqr(s.omega)
+            + w.joint_velocity * ca.sumsqr(s.dq_j)
+            + w.joint_acceleration * ca.sumsqr(s.ddq_j)
+        )
+        kind = rows.stage("lift_off", s.x, s.u, s.p, cost, flight.step())
         self._kinds[key] = kind
         return kind
 
@@ -196,10 +217,11 @@ class KinoDynamic:
         robot, settings = self.robot, self.settings
         n, N, M = robot.n_joints, len(schedule.contact), schedule.flight_knots
         low, high = robot.planning_range
-        in_range = {"x_min": np.concatenate([np.full(13, -np.inf), low]), "x_max": np.concatenate([np.full(13, np.inf), high])}
+        in_range = {"x_min": np.concatenate([np.full(13, -np.inf), low, np.full(n, -np.inf)]), "x_max": np.concatenate([np.full(13, np.inf), high, np.full(n, np.inf)])}
         aware = self.variant is not Variant.KD
         speed = settings.speed_margin * robot.actuators.no_load_speed if aware else np.full(n, np.inf)  # (3.11a)
-        x = np.hstack([guess.com, guess.com_velocity, guess.angular_momentum, guess.orientation, guess.joint_position])
+        before = np.vstack([np.zeros(n), guess.joint_velocity[:-1]])
+        x = np.hstack([guess.com, guess.com_velocity, guess.angular_momentum, guess.orientation, guess.joint_position, before])
         foot_ref = reference.foot_position.ravel()
         path = reference.flight_path
         stages = []
@@ -207,7 +229,7 @@ class KinoDynamic:
             loaded = schedule.contact[k]
             n_f = int(loaded.sum())
             p = [[schedule.dt], reference.com[k], reference.com_velocity[k], reference.orientation[k]]
-            p += [reference.joint_position[k], reference.x_0[-n:], foot_ref, reference.x_0]
+            p += [reference.joint_position[k], reference.x_0[-n:], foot_ref, reference.x_0, np.zeros(n)]
             u = [guess.angular_velocity[k], guess.joint_velocity[k], guess.force[k][loaded].ravel()]
             force_min = np.tile([-np.inf, -np.inf, settings.force_min], n_f)
             force_max = np.tile([np.inf, np.inf, settings.force_max], n_f)
@@ -221,8 +243,12 @@ class KinoDynamic:
                     **({} if k == 0 else in_range),  # where the robot stands is given
                 )
             )
-        p = [foot_ref, [schedule.flight_time, settings.landing_lead], reference.landing_com, path.parameters(0)]
-        stages.append(StageData.free(p=np.concatenate(p), x=x[N], u=guess.flight_angular_velocity[0], **in_range))
+        p = [[schedule.dt], foot_ref, [schedule.flight_time, settings.landing_lead], reference.landing_com, path.parameters(0)]
+        u = [guess.flight_angular_velocity[0], guess.angular_velocity[-1], guess.joint_velocity[-1]]
+        u_max = np.concatenate([np.full(6, np.inf), speed])
+        stages.append(
+            StageData.free(p=np.concatenate(p), x=x[N], u=np.concatenate(u), u_min=-u_max, u_max=u_max, **in_range)
+        )
         flight = np.hstack([guess.flight_orientation, guess.flight_joint_position])
         for k in range(1, M + 1):
             x_k = np.concatenate([guess.angular_momentum[-1], flight[k]])
@@ -239,20 +265,26 @@ class KinoDynamic:
         force = np.zeros((N, self.robot.n_contacts, 3))
         for k in range(N):
             force[k][schedule.contact[k]] = solution.u[k][3 + n :].reshape(-1, 3)
-        flight = np.array([x[N][6:], *solution.x[N + 1 :]])
+        flight = np.array([x[N][6 : 13 + n], *solution.x[N + 1 :]])
         return TakeOffTrajectory(
             com=x[:, :3],
             com_velocity=x[:, 3:6],
             angular_momentum=x[:, 6:9],
             orientation=x[:, 9:13],
-            joint_position=x[:, 13:],
-            angular_velocity=np.array([u[:3] for u in solution.u[:N]]),
-            joint_velocity=np.array([u[3 : 3 + n] for u in solution.u[:N]]),
+            joint_position=x[:, 13 : 13 + n],
+            angular_velocity=np.array([u[:3] for u in solution.u[:N]] + [solution.u[N][3:6]]),
+            joint_velocity=np.array([u[3 : 3 + n] for u in solution.u[:N]] + [solution.u[N][6:]]),
             force=force,
             flight_orientation=flight[:, 3:7],
             flight_joint_position=flight[:, 7:],
             flight_angular_velocity=np.array([u[:3] for u in solution.u[N : N + schedule.flight_knots]]),
         )
+
+
+def _joint_inertia(robot: Robot) -> np.ndarray:
+    """Return the joints' block of the mass matrix ``(n, n)`` at the home pose, rotor inertia included [kg·m²]."""
+    q = robot.standing_configuration()
+    return Kinematics(robot).at(q, np.zeros(robot.model.nv)).M[JOINT_VELOCITY, JOINT_VELOCITY]
 
 
 class _TakeOffSymbols:
@@ -268,19 +300,24 @@ class _TakeOffSymbols:
         self.omega, self.dq_j = ca.SX.sym("omega", 3), ca.SX.sym("dq_j", n)
         self.force = {int(i): ca.SX.sym(f"f_{i}", 3) for i in np.flatnonzero(loaded)}
         self.f = ca.vertcat(*self.force.values())
-        self.x = ca.vertcat(self.r, self.rdot, self.alpha, self.quaternion, self.q_j)
+        self.dq_before = ca.SX.sym("dq_before", n)
+        self.x = ca.vertcat(self.r, self.rdot, self.alpha, self.quaternion, self.q_j, self.dq_before)
         self.foot_ref = ca.SX.sym("foot_ref", 3, n_c)
         if in_flight:
-            self.u = self.omega
+            self.omega_ground = ca.SX.sym("omega_ground", 3)
+            self.dt = ca.SX.sym("dt")
+            self.ddq_j = (self.dq_j - self.dq_before) / self.dt
+            self.u = ca.vertcat(self.omega, self.omega_ground, self.dq_j)
             self.flight_time, self.landing_lead = ca.SX.sym("T"), ca.SX.sym("lead")
             self.landing_com = ca.SX.sym("landing_com", 3)
             self.flight_p = ca.SX.sym("flight_p", _FlightSymbols.n_p(robot))
             self.p = ca.vertcat(
-                ca.vec(self.foot_ref), self.flight_time, self.landing_lead, self.landing_com, self.flight_p
+                self.dt, ca.vec(self.foot_ref), self.flight_time, self.landing_lead, self.landing_com, self.flight_p
             )
             return
         self.u = ca.vertcat(self.omega, self.dq_j, self.f)
         self.dt = ca.SX.sym("dt")
+        self.ddq_j = (self.dq_j - self.dq_before) / self.dt
         self.r_ref, self.rdot_ref = ca.SX.sym("r_ref", 3), ca.SX.sym("rdot_ref", 3)
         self.quaternion_ref, self.q_j_ref = ca.SX.sym("quat_ref", 4), ca.SX.sym("q_j_ref", n)
         self.q_j_frozen = ca.SX.sym("q_j_frozen", n)
@@ -315,6 +352,7 @@ class _TakeOffSymbols:
             self.alpha + alpha_dot * self.dt,
             quaternion_product(self.quaternion, quaternion_step(self.omega, self.dt)),
             self.q_j + self.dq_j * self.dt,
+            self.dq_j,
         )
 
 
@@ -351,6 +389,17 @@ def _world_feet(model: BaseFrameModel, s: _TakeOffSymbols) -> ca.SX:
     """Return c_i ``(3, n_c)`` [m] in S from the centre of mass and the attitude (3.7)."""
     relative = model.feet(s.q_j) - ca.repmat(model.com(s.q_j), 1, s.foot_ref.shape[1])
     return ca.repmat(s.r, 1, s.foot_ref.shape[1]) + s.R @ relative
+
+
+def _foot_velocities(model: BaseFrameModel, s: _TakeOffSymbols) -> list[ca.SX]:
+    """Return each ċ_i ``(3,)`` in B [m/s] at the rates of the ground."""
+    feet, com, J = model.feet(s.q_j), model.com(s.q_j), model.foot_jacobians(s.q_j)
+    J_com = ca.jacobian(com, s.q_j)
+    rates = []
+    for i in range(s.foot_ref.shape[1]):
+        relative = feet[:, i] - com
+        rates.append(s.R.T @ s.rdot + ca.cross(s.omega_ground, relative) + (J[3 * i : 3 * i + 3, :] - J_com) @ s.dq_j)
+    return rates
 
 
 def _contact_sets(schedule: Schedule) -> list[tuple[tuple[bool, ...] | None, tuple[bool, ...]]]:

@@ -13,6 +13,7 @@ class Weights:
     joint_position: float = 0.05  # [1/rad²]
     angular_velocity: float = 0.01  # [s²/rad²]
     joint_velocity: float = 1e-3  # [s²/rad²]
+    joint_acceleration: float = 1e-6  # keeps rates from jumping between knots [s⁴/rad²]
     com: float = 5.0  # [1/m²]
     com_velocity: float = 0.1  # [s²/m²]
     force: float = 1e-4  # [1/N²]
@@ -28,7 +29,7 @@ class PlannerSettings:
 
     dt: float = 0.01  # of the take-off knots, as in the thesis [s]
     flight_knots: int = 16  # intervals of the flight
-    margin: float = 0.85  # share of torque and voltage limits a plan may use: −Jᵀf leaves leg inertia and losses out
+    margin: float = 0.85  # share of torque and voltage limits a plan may use; the rest is for feedback and what (3.14) leaves out
     speed_margin: float = 0.9  # share of the no-load speed a plan may use
     force_max: float = 300.0  # greatest normal force of one contact [N]
     force_min: float = 0.0  # least normal force of one loaded contact [N]

@@ -73,8 +73,8 @@ class SingleRigidBody:
             angular_momentum=reference.angular_momentum,
             orientation=reference.orientation,
             joint_position=reference.joint_position,
-            angular_velocity=np.zeros((N, 3)),
-            joint_velocity=np.zeros((N, self.robot.n_joints)),
+            angular_velocity=np.zeros((N + 1, 3)),
+            joint_velocity=np.zeros((N + 1, self.robot.n_joints)),
             force=schedule.contact[..., None] * share / n_f,
             flight_orientation=reference.flight_orientation,
             flight_joint_position=reference.flight_path.at(pose, reference.flight_path.dt * np.arange(M + 1))[0],
@@ -218,14 +218,15 @@ class SingleRigidBody:
         flight_R = rotation.matrix(flight[:, 3:])
         dt = reference.flight_path.dt
         flight_omega = np.einsum("ab,kcb,kc->ka", self.inertia_inverse, flight_R.transpose(0, 2, 1), flight[:, :3])
+        rates = np.diff(q_j, axis=0) / schedule.dt
         return TakeOffTrajectory(
             com=com,
             com_velocity=x[:, 3:6],
             angular_momentum=alpha,
             orientation=quaternion,
             joint_position=q_j,
-            angular_velocity=omega[:-1],
-            joint_velocity=np.diff(q_j, axis=0) / schedule.dt,
+            angular_velocity=omega,
+            joint_velocity=np.vstack([rates, rates[-1:]]),
             force=force,
             flight_orientation=flight[:, 3:],
             flight_joint_position=reference.flight_path.at(q_j[-1], dt * np.arange(schedule.flight_knots + 1))[0],

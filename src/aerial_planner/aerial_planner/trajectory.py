@@ -16,8 +16,8 @@ class TakeOffTrajectory:
     angular_momentum: np.ndarray  # (N+1, 3)
     orientation: np.ndarray  # (N+1, 4)
     joint_position: np.ndarray  # (N+1, n)
-    angular_velocity: np.ndarray  # (N, 3) in B
-    joint_velocity: np.ndarray  # (N, n)
+    angular_velocity: np.ndarray  # (N+1, 3) in B, contacts held
+    joint_velocity: np.ndarray  # (N+1, n)
     force: np.ndarray  # (N, n_c, 3)
     flight_orientation: np.ndarray  # (M+1, 4)
     flight_joint_position: np.ndarray  # (M+1, n)
