@@ -15,20 +15,24 @@ class ContactSensing:
         model = world.model
         self._world = world
         self._is_world = model.geom_bodyid == WORLD_BODY  # (ngeom,)
-        self._touched = np.zeros(model.ngeom, dtype=bool)
         self._is_point = np.zeros(model.ngeom, dtype=bool)
         self._is_point[world.contact_geoms] = True
+        self._met = np.zeros((model.ngeom, model.ngeom), dtype=bool)  # which pairs touched, in MuJoCo's order
         self._wrench = np.zeros(6)
 
     def clear(self) -> None:
         """Forget the period."""
-        self._touched[:] = False
+        self._met[:] = False
 
     def collect(self, data: mujoco.MjData) -> None:
         """Add the touches of the physics step just made."""
-        if data.ncon:
-            pairs = data.contact.geom  # (ncon, 2)
-            self._touched[pairs[self._is_world[pairs].any(axis=1)]] = True
+        pairs = data.contact.geom  # (ncon, 2)
+        self._met[pairs[:, 0], pairs[:, 1]] = True
+
+    @property
+    def _touched(self) -> np.ndarray:
+        """Which geoms touched the world ``(ngeom,)`` bool."""
+        return self._met[self._is_world].any(axis=0) | self._met[:, self._is_world].any(axis=1)
 
     @property
     def points(self) -> np.ndarray:
@@ -38,7 +42,7 @@ class ContactSensing:
     @property
     def other_links(self) -> tuple[str, ...]:
         """Links that touched the world elsewhere than at a contact point."""
-        others = np.flatnonzero(self._touched & ~self._is_world & ~self._is_point)
+        others = np.flatnonzero(self._touched & ~self._is_point)
         model = self._world.model
         return tuple(model.body(body).name for body in np.unique(model.geom_bodyid[others]))
 
