@@ -34,9 +34,9 @@ def finite(text: str) -> float:
 finite.__name__ = "number"  # argparse names the type in its message
 
 
-def add_goal_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add MOTION, its goal and its terrain."""
-    parser.add_argument("motion", metavar="MOTION", help="jump, or another file name in the planner's motions/")
+def add_goal_arguments(parser: argparse.ArgumentParser, more: str = "") -> None:
+    """Add MOTION, its goal and its terrain; ``more`` is said about MOTION."""
+    parser.add_argument("motion", metavar="MOTION", help=f"jump, or another file name in the planner's motions/{more}")
     goal = parser.add_argument_group("goal, from where the robot stands: x ahead, y to the left, z up")
     goal.add_argument(
         "--to", metavar="X,Y[,Z]", type=displacement, default=(0.0, 0.0), help="landing place [m]; Z: its height"

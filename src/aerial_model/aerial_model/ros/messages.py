@@ -31,6 +31,12 @@ _PLAN_CONTACT_ROWS = ("foot_position", "force")
 _PLAN_NUMBERS = ("take_off_time", "landing_time", "landing_com_height", "landing_yaw")
 _PLAN_VECTORS = ("landing_support_centre", "rotation")
 
+_CODES = {getattr(MotionResult, code.name): code for code in RefusalCode}
+_OUTCOMES = {
+    getattr(MotionResult, name): name.lower()
+    for name in ("PLANNED", "REFUSED", "STARTED", "LANDED", "FAILED", "ABORTED")
+}
+
 
 def to_stamp(time: float) -> Time:
     """Return a time [s] as a stamp, rounded to the nanosecond."""
@@ -108,6 +114,16 @@ def selection_from_message(message: MotionSelection) -> MotionRequest:
 def code_to_message(code: RefusalCode) -> int:
     """Return the constant of ``MotionResult`` that mirrors a refusal code."""
     return int(getattr(MotionResult, code.name))
+
+
+def code_from_message(message: MotionResult) -> RefusalCode | None:
+    """Return the refusal code of an answer; None if it has none."""
+    return _CODES.get(message.code)
+
+
+def outcome_from_message(message: MotionResult) -> str:
+    """Return the outcome an answer tells, as a word."""
+    return _OUTCOMES.get(message.outcome, f"outcome {message.outcome}")
 
 
 def result_to_message(

@@ -1,0 +1,185 @@
+"""The operator's end of ROS: selects motions and hears what comes of them."""
+
+from __future__ import annotations
+
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from aerial_model.errors import RefusalCode, RefusalError
+from aerial_model.request import ControllerCommand, MotionRequest
+from aerial_model.ros import qos
+from aerial_model.ros.messages import code_from_message, from_stamp, outcome_from_message, selection_to_message
+from aerial_msgs.msg import ControllerStatus, MotionResult, MotionSelection
+from aerial_operator.nodes import CONTROLLER, PLANNER, PROGRAMS, NodeProgram
+
+DISCOVERY_TIMEOUT = 3.0  # for a listener to be found [s]
+PLANNING_TIMEOUT = 15.0  # for a first answer; a planner that has just started builds its problems first [s]
+START_TIMEOUT = 3.0  # from plan to motion [s]
+MOTION_TIMEOUT = 20.0  # from start to end [s]
+DIAGNOSTICS_TIMEOUT = 5.0  # [s]
+_SPIN_TIMEOUT = 0.1  # within which Ctrl-C is served [s]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """One answer to a selection."""
+
+    outcome: str  # a constant of ``MotionResult`` in lower case
+    code: RefusalCode | None
+    reason: str
+    after: float  # since the selection, wall time [s]
+
+    @property
+    def final(self) -> bool:
+        """Whether no further answer follows."""
+        return self.outcome in ("refused", "landed", "failed", "aborted")
+
+    def __str__(self) -> str:
+        return f"{self.outcome} after {self.after:.2f} s" + (f": {self.reason}" if self.reason else "")
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the answer as plain JSON types."""
+        return {"outcome": self.outcome, "code": self.code, "reason": self.reason, "after_s": self.after}
+
+
+class Client(Node):
+    """A node that selects motions; made by ``connected``."""
+
+    def __init__(self, executor: EventsExecutor) -> None:
+        super().__init__("operator", use_global_arguments=False)
+        self._executor = executor
+        self._selections = self.create_publisher(MotionSelection, "motion_selection", qos.EVENT)
+        self.create_subscription(MotionResult, "motion_result", self._on_result, qos.EVENT)
+        self.create_subscription(ControllerStatus, "controller_status", self._on_status, qos.TELEMETRY)
+        self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, qos.EVENT)
+        self.status: ControllerStatus | None = None  # the controller's last
+        self.diagnostics: dict[str, tuple[str, dict[str, str]]] = {}  # node → last message and figures
+        self._results: list[tuple[float, MotionResult]] = []
+
+    @property
+    def time(self) -> float:
+        """Time of the last state the controller served [s]; 0 before the first."""
+        return 0.0 if self.status is None else from_stamp(self.status.stamp)
+
+    def figures(self, program: NodeProgram) -> dict[str, str]:
+        """Return the figures of a node's next diagnostics.
+
+        Raises:
+            RefusalError: with code TIMEOUT if none come.
+        """
+        self.diagnostics.pop(program.name, None)
+        if not self.wait(lambda: program.name in self.diagnostics, DIAGNOSTICS_TIMEOUT):
+            raise _timeout(f"no diagnostics from {program.name} for {DIAGNOSTICS_TIMEOUT:.0f} s")
+        return self.diagnostics[program.name][1]
+
+    @property
+    def missing(self) -> list[str]:
+        """What keeps a motion from being selected, each in a few words; empty when all is ready."""
+        missing = [f"no word from {program.name}" for program in PROGRAMS if program.name not in self.diagnostics]
+        activity, _ = self.diagnostics.get(PLANNER.name, ("", {}))
+        if activity.startswith("warming up"):
+            missing.append(f"the planner is {activity}")
+        if self.status is None or self.status.phase != ControllerStatus.STAND:
+            missing.append("the robot does not stand")
+        return missing
+
+    def wait(self, condition: Callable[[], bool], timeout: float) -> bool:
+        """Serve messages until ``condition`` holds, ``timeout`` [s] at most; return whether it does."""
+        deadline = time.monotonic() + timeout
+        while not condition():
+            remaining = deadline - time.monotonic()
+            if remaining <= 0:
+                return False
+            self._executor.spin_once(timeout_sec=min(_SPIN_TIMEOUT, remaining))
+        return True
+
+    def select(
+        self, request: MotionRequest, heard: Callable[[Answer], None] = lambda answer: None
+    ) -> tuple[str, list[Answer]]:
+        """Ask for a motion and wait until it is over.
+
+        Args:
+            request: its request id is chosen here.
+            heard: called with each answer when it comes.
+
+        Returns:
+            the request id, and the answers, of which the last is final.
+
+        Raises:
+            RefusalError: with code TIMEOUT if an answer is missing, saying who is silent.
+        """
+        request = replace(request, request_id=uuid.uuid4().hex[:8])
+        server = CONTROLLER if request.motion in list(ControllerCommand) else PLANNER
+        if not self.wait(lambda: self._listens(server.name), DISCOVERY_TIMEOUT):
+            raise _timeout(f"no {server.name} is running: nobody would answer; start one with ./aerial up")
+        self._results.clear()
+        selected = time.monotonic()
+        self._selections.publish(selection_to_message(request))
+        answers: list[Answer] = []
+        while not answers or not answers[-1].final:
+            answers.append(self._next_answer(request, answers, selected, server.name))
+            heard(answers[-1])
+        return request.request_id, answers
+
+    def _next_answer(self, request: MotionRequest, answers: list[Answer], selected: float, server: str) -> Answer:
+        if not answers:
+            timeout, silent = PLANNING_TIMEOUT, f"the {server} did not answer"
+        elif any(answer.outcome == "started" for answer in answers):  # of two nodes' answers, it may outrun "planned"
+            timeout, silent = MOTION_TIMEOUT, "the motion began, but its end was not reported"
+        else:
+            timeout, silent = START_TIMEOUT, f"a plan was made, but no {CONTROLLER.name} began it"
+        if not self.wait(lambda: self._answers(request.request_id) > len(answers), timeout):
+            raise _timeout(f"{silent} within {timeout:.0f} s")
+        arrived, result = [(t, r) for t, r in self._results if r.request_id == request.request_id][len(answers)]
+        return Answer(
+            outcome=outcome_from_message(result),
+            code=code_from_message(result),
+            reason=result.reason,
+            after=arrived - selected,
+        )
+
+    def _answers(self, request_id: str) -> int:
+        return sum(result.request_id == request_id for _, result in self._results)
+
+    def _listens(self, name: str) -> bool:
+        return any(end.node_name == name for end in self.get_subscriptions_info_by_topic("motion_selection"))
+
+    def _on_result(self, message: MotionResult) -> None:
+        self._results.append((time.monotonic(), message))
+
+    def _on_status(self, message: ControllerStatus) -> None:
+        self.status = message
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            figures = {pair.key: pair.value for pair in status.values}
+            self.diagnostics[status.name.rsplit("/", 1)[-1]] = (status.message, figures)
+
+
+@contextmanager
+def connected() -> Iterator[Client]:
+    """Yield a client; it is gone when the context ends."""
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    executor = EventsExecutor()
+    client = Client(executor)
+    executor.add_node(client)
+    try:
+        yield client
+    finally:
+        executor.shutdown()
+        client.destroy_node()
+        rclpy.try_shutdown()
+
+
+def _timeout(sentence: str) -> RefusalError:
+    return RefusalError(RefusalCode.TIMEOUT, sentence)

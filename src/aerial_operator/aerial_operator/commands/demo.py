@@ -1,0 +1,184 @@
+"""``aerial demo``: three nodes as processes over DDS, in real time; four jumps, each from where the last one ended."""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import os
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from aerial_model.errors import RefusalCode, RefusalError
+from aerial_model.request import MotionRequest
+from aerial_model.robot import Robot
+from aerial_operator.client import Answer, Client, connected
+from aerial_operator.console import Report, percent, say, table
+from aerial_operator.nodes import SIMULATOR, NodeProcesses, parameters
+from aerial_operator.pictures import save_picture
+from aerial_operator.recording import Recorder
+from aerial_operator.trial import Execution, Trial, execution, judged
+
+JUMPS = {
+    "0.3 m forward": (0.3, 0.0, 0.0),
+    "0.2 m backward": (-0.2, 0.0, 0.0),
+    "0.2 m to the left": (0.0, 0.2, 0.0),
+    "0.6 m onto a platform": (0.6, 0.0, 0.16),
+}  # displacement of the landing [m]
+READY_TIMEOUT = 60.0  # [s]
+STATE_TIMEOUT = 10.0  # for simulated time to go on, and for diagnostics [s]
+_LIFE_PERIOD = 0.5  # between two looks whether the nodes live [s]
+_NICENESS = 5  # of this process: recording can wait
+_DOMAINS = 100  # ROS domains 1 … 100, of which a demo takes one
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Jump:
+    """One jump of the demo."""
+
+    name: str
+    answers: list[Answer]
+    execution: Execution | None  # None: it never began
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add noise and the place of the results."""
+    parser.add_argument("--noise", choices=("nominal", "off"), default="nominal", help="(default: nominal)")
+    parser.add_argument("--out", metavar="FOLDER", type=Path, default=Path("out"), help="of the results (default: out)")
+
+
+def run(args: argparse.Namespace) -> Report:
+    """Run the jumps, judge them by ground truth, leave recording and pictures."""
+    robot = Robot.load(args.robot)
+    folder = args.out / "demo"
+    folder.mkdir(parents=True, exist_ok=True)
+    os.environ["ROS_DOMAIN_ID"] = str(os.getpid() % _DOMAINS + 1)  # apart from whatever else runs
+    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    log = folder / "nodes.log"
+    told = parameters(args.robot, seed=args.seed, noise=args.noise)
+    with log.open("w") as file, NodeProcesses(told, file) as nodes, connected() as client:
+        os.nice(_NICENESS)
+        recorder = Recorder(client)
+        say(f"simulator, controller and planner start as three processes; they log to {log}")
+        _await_ready(client, nodes)
+        before = client.figures(SIMULATOR)
+        gc.disable()
+        jumps = [_jump(robot, client, recorder, name, displacement) for name, displacement in JUMPS.items()]
+        gc.enable()
+        control = _control_figures(before, client.figures(SIMULATOR), recorder)
+    say("judging by ground truth, writing the recording, drawing")
+    recorder.write(folder / "recording")
+    trials = [None if jump.execution is None else judged(robot, recorder, jump.execution) for jump in jumps]
+    pictures = _draw(robot, jumps, trials, folder)
+    motions = [_motion_figures(robot, jump, result, args) for jump, result in zip(jumps, trials, strict=True)]
+    landed = all(motion["landed"] for motion in motions)
+    figures = {
+        "landed": landed,
+        "motions": motions,
+        "control": control,
+        "recording": str(folder / "recording"),
+        "pictures": [str(picture) for picture in pictures],
+    }
+    return Report(success=landed, figures=figures, text=_summary(figures))
+
+
+def _await_ready(client: Client, nodes: NodeProcesses) -> None:
+    """Wait until the robot stands and the planner is warm.
+
+    Raises:
+        RefusalError: if a node ends, or it takes too long.
+    """
+    deadline = time.monotonic() + READY_TIMEOUT
+    while not client.wait(lambda: not client.missing, _LIFE_PERIOD):
+        for _, sentence in nodes.newly_dead():
+            raise RefusalError(RefusalCode.INTERNAL, sentence)
+        if time.monotonic() > deadline:
+            missing = "; ".join(client.missing)
+            raise RefusalError(RefusalCode.TIMEOUT, f"not ready after {READY_TIMEOUT:.0f} s: {missing}")
+
+
+def _jump(robot: Robot, client: Client, recorder: Recorder, name: str, displacement: tuple[float, ...]) -> _Jump:
+    """Select a jump; wait until it is over and its landing has been observed."""
+    request = MotionRequest(motion="jump", displacement=displacement)
+    if displacement[2]:
+        request = request.with_platform(robot)
+    say(f"jump {name}")
+    request_id, answers = client.select(request, heard=lambda answer: say(f"  {answer}"))
+    done = execution(robot, recorder, request_id)
+    if done is not None:
+        client.wait(lambda: client.time > done.end_time, STATE_TIMEOUT)
+    return _Jump(name=name, answers=answers, execution=done)
+
+
+def _control_figures(before: Mapping[str, str], after: Mapping[str, str], recorder: Recorder) -> dict[str, Any]:
+    """Return how the control loop kept up between two diagnostics of the simulator."""
+    sequence = [message.sequence for message in recorder.messages("state")]
+    arrival = recorder.arrivals("state")
+    return {
+        "rate_hz": (sequence[-1] - sequence[0]) / (arrival[-1] - arrival[0]),
+        "ticks": int(after["ticks"]) - int(before["ticks"]),
+        "missed_ticks": int(after["missed_ticks"]) - int(before["missed_ticks"]),
+        "round_trip_us": {name: float(after[f"round_trip_us_{name}"]) for name in ("p50", "p99")},
+    }
+
+
+def _motion_figures(robot: Robot, jump: _Jump, result: Trial | None, args: argparse.Namespace) -> dict[str, Any]:
+    last = jump.answers[-1]
+    return {
+        "motion": "jump",
+        "asked": jump.name,
+        "robot": robot.name,
+        "seed": args.seed,
+        "noise": args.noise,
+        "planning_time_s": jump.answers[0].after,
+        **({"landed": False, "checks": {}, "plan": None} if result is None else result.to_json(robot)),
+        "refusal": None if last.code is None else {"code": last.code.value, "reason": last.reason},
+    }
+
+
+def _draw(robot: Robot, jumps: list[_Jump], trials: list[Trial | None], folder: Path) -> list[Path]:
+    """Draw each jump that happened, on the terrain that was there."""
+    pictures = []
+    for jump, result in zip(jumps, trials, strict=True):
+        if result is not None:
+            path = folder / f"{jump.name.replace(' ', '_')}.png"
+            done = result.execution
+            origin, heading = robot.start_frame(result.ticks[0].truth.q)
+            terrain = done.plan.terrain.placed(origin, heading)
+            save_picture(robot, done.plan, terrain, result.ticks, done.start_time, path)
+            pictures.append(path)
+    return pictures
+
+
+def _summary(figures: Mapping[str, Any]) -> str:
+    control = figures["control"]
+    share = control["missed_ticks"] / max(control["ticks"], 1)
+    round_trip = control["round_trip_us"]
+    header = ("jump", "planned in", "happened", "error", "peak torque", "peak voltage")
+    return "\n".join(
+        [
+            table(header, [_row(motion) for motion in figures["motions"]]),
+            "",
+            f"  control    {control['rate_hz']:.0f} Hz, {control['missed_ticks']} of {control['ticks']} ticks missed "
+            f"({100 * share:.2f} %), round trip {round_trip['p50']:.0f} µs (99 %: {round_trip['p99']:.0f} µs)",
+            f"  recording  {figures['recording']}",
+            *(f"  picture    {picture}" for picture in figures["pictures"]),
+        ]
+    )
+
+
+def _row(motion: Mapping[str, Any]) -> list[str]:
+    name, planned = motion["asked"], f"{motion['planning_time_s']:.2f} s"
+    if not motion["checks"]:
+        return [name, planned, f"refused: {motion['refusal']['reason']}", "–", "–", "–"]
+    failed = [check for check, holds in motion["checks"].items() if not holds]
+    return [
+        name,
+        planned,
+        "landed" if motion["landed"] else f"not landed: {', '.join(failed)}",
+        f"{100 * motion['position_error_m']:.1f} cm, {motion['tilt_deg']:.1f}°",
+        percent(motion["peak_torque_ratio"]),
+        percent(motion["peak_voltage_ratio"]),
+    ]
