@@ -71,7 +71,9 @@ class Controller:
         self._estimator.reset()
         self._phases = Phases(self.robot, self._gains, self._home_height)
         self._drive = Drive(self.robot, self._gains)
-        self._now: tuple[Configuration, WholeBodyTarget | PostureTarget | None] | None = None  # what the last tick saw and wanted
+        self._now: tuple[Configuration, WholeBodyTarget | PostureTarget | None] | None = (
+            None  # what the last tick saw and wanted
+        )
         self.estimate: Estimate | None = None  # in the odom frame; None before the first measurement
         self._ticks = self._fallback_ticks = 0
 

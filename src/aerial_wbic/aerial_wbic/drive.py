@@ -29,9 +29,7 @@ class Drive:
         self._stop_damping = np.full(n, gains.stop_damping)
         self.saturated_ticks = 0
 
-    def command(
-        self, state: Configuration, solution: Solution, v_ref: np.ndarray, measurement: Measurement
-    ) -> Command:
+    def command(self, state: Configuration, solution: Solution, v_ref: np.ndarray, measurement: Measurement) -> Command:
         """Return the command for an acceleration and forces that obey the base's equations of motion.
 
         τ = joint rows of H q̈ + C q̇ + G − J_cᵀ f_r, plus the friction of the joints moving at q̇_ref. Damping about
@@ -79,6 +77,4 @@ class Drive:
 def inverse_dynamics(state: Configuration, solution: Solution) -> np.ndarray:
     """Return the joint torques ``(n,)`` [N·m], the joint rows of H q̈ + C q̇ + G − Σ J_c,iᵀ f_i, thesis (2.2)."""
     J_joints = state.J_contacts[:, :, JOINT_VELOCITY].reshape(solution.force.size, -1)  # (3 n_c, n)
-    return (
-        state.M[JOINT_VELOCITY] @ solution.vdot + state.nle[JOINT_VELOCITY] - solution.force.ravel() @ J_joints
-    )
+    return state.M[JOINT_VELOCITY] @ solution.vdot + state.nle[JOINT_VELOCITY] - solution.force.ravel() @ J_joints

@@ -136,9 +136,7 @@ class Estimator:
         roll[:, 0], roll[:, 1] = twist[:, 4] * self._radius, -twist[:, 3] * self._radius
         return offset, twist[:, :3], roll
 
-    def _correct(
-        self, offset: np.ndarray, offset_velocity: np.ndarray, roll: np.ndarray, contact: np.ndarray
-    ) -> None:
+    def _correct(self, offset: np.ndarray, offset_velocity: np.ndarray, roll: np.ndarray, contact: np.ndarray) -> None:
         X, noise = self._X, self._noise
         loaded = np.flatnonzero(contact)
         slip = roll[loaded] - offset_velocity[loaded] - X[V]  # innovation of u_i = v + R (ω × p_i + ṗ_i)

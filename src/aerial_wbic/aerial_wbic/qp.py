@@ -60,9 +60,7 @@ class ForceOptimization:
 
     def __init__(self, robot: Robot, weight_base: float, weight_force: float) -> None:
         self._pyramid = friction_pyramid(robot.friction_coefficient)
-        self._programs = [
-            _Program(n, self._pyramid, weight_base, weight_force) for n in range(1, robot.n_contacts + 1)
-        ]
+        self._programs = [_Program(n, self._pyramid, weight_base, weight_force) for n in range(1, robot.n_contacts + 1)]
 
     def solve(self, state: Configuration, vdot_cmd: np.ndarray, f_cmd: np.ndarray, contact: np.ndarray) -> Solution:
         """Return the forces and the acceleration of (3.24).

@@ -36,7 +36,9 @@ class Limbs:
         return np.flatnonzero(self._chains[~contact].any(axis=0) & ~loaded)
 
 
-def prioritized_tasks(state: Configuration, target: WholeBodyTarget, limbs: Limbs, gains: ControllerGains) -> list[Task]:
+def prioritized_tasks(
+    state: Configuration, target: WholeBodyTarget, limbs: Limbs, gains: ControllerGains
+) -> list[Task]:
     """Return the controller's tasks at ``state``, most important first."""
     return [
         limb_task(state, target, limbs.swinging(target.contact), gains.swing_joint),
