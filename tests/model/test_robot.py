@@ -90,13 +90,13 @@ def test_bad_data_gets_a_sentence_that_names_it(folder, change, sentence):
 
 
 def test_an_unknown_robot_is_answered_with_those_that_exist():
-    with pytest.raises(ConfigurationError, match="did you mean 'mini_cheetah'.*one of .*mini_cheetah"):
+    with pytest.raises(ConfigurationError, match=r"did you mean 'mini_cheetah'.*one of .*mini_cheetah"):
         Robot.load("mini_cheeta")
 
 
 def test_a_folder_without_urdf_is_refused(folder):
     (folder / "robot.urdf").unlink()
-    with pytest.raises(ConfigurationError, match="robot.urdf is missing"):
+    with pytest.raises(ConfigurationError, match=r"robot\.urdf is missing"):
         Robot.load(folder)
 
 

@@ -65,4 +65,6 @@ def test_joint_rates_are_the_derivative_of_the_path(robot, model):
 
 
 def test_the_flight_ends_in_the_landing_pose(robot, model):
-    np.testing.assert_allclose(fly(robot, model, [0, 0, 0], rate=3.0).joint_position[-1], robot.poses["landing"], atol=1e-9)
+    np.testing.assert_allclose(
+        fly(robot, model, [0, 0, 0], rate=3.0).joint_position[-1], robot.poses["landing"], atol=1e-9
+    )

@@ -97,7 +97,9 @@ def test_forces_move_the_centre_of_mass_and_its_momentum_as_planned(case, robot)
         moment = np.cross(plan.foot_position[k] - plan.com[k], plan.force[k]).sum(axis=0)
         v = plan.com_velocity[k] + (force / robot.mass + G) * dt
         np.testing.assert_allclose(plan.com_velocity[k + 1], v, atol=POSITION_TOLERANCE)
-        np.testing.assert_allclose(plan.angular_momentum[k + 1], plan.angular_momentum[k] + moment * dt, atol=MOMENTUM_TOLERANCE)
+        np.testing.assert_allclose(
+            plan.angular_momentum[k + 1], plan.angular_momentum[k] + moment * dt, atol=MOMENTUM_TOLERANCE
+        )
 
 
 def test_forces_stay_in_the_friction_pyramid(case, robot):
@@ -152,7 +154,9 @@ def test_a_placed_plan_is_the_same_motion_elsewhere(forward, robot):
     back = moved.placed(np.zeros(3), -0.7)
     shift = rotation.matrix(rotation.about_z(-0.7)) @ np.array([1.0, 2.0, 0.3])
     np.testing.assert_allclose(back.com - shift, plan.com, atol=1e-12)
-    np.testing.assert_allclose(moved.foot_position[5], [robot.contact_positions(moved.q[5])[i] for i in range(4)], atol=1e-6)
+    np.testing.assert_allclose(
+        moved.foot_position[5], [robot.contact_positions(moved.q[5])[i] for i in range(4)], atol=1e-6
+    )
 
 
 def test_the_same_request_gives_the_same_plan_to_the_last_bit(planner, forward):
@@ -191,8 +195,16 @@ def test_ipopt_finds_what_fatrop_finds(robot, forward):
         (MotionRequest(motion="jmp"), RefusalCode.UNKNOWN_MOTION, "did you mean 'jump'"),
         (jump(3.0, 0.0), RefusalCode.OUT_OF_REACH, "friction"),
         (jump(0.0, 2.0), RefusalCode.NO_SOLUTION, "binds: .*friction"),
-        (jump(0.6, 0.0, 2.0, terrain=Terrain.platform(2.0, 0.3, 0.0)), RefusalCode.NO_SOLUTION, "binds: .*(voltage|torque)"),
-        (jump(0.6, 0.0, 0.5, terrain=Terrain.platform(0.5, 0.3, 0.0)), RefusalCode.NO_SOLUTION, "binds: .*(voltage|torque)"),
+        (
+            jump(0.6, 0.0, 2.0, terrain=Terrain.platform(2.0, 0.3, 0.0)),
+            RefusalCode.NO_SOLUTION,
+            "binds: .*(voltage|torque)",
+        ),
+        (
+            jump(0.6, 0.0, 0.5, terrain=Terrain.platform(0.5, 0.3, 0.0)),
+            RefusalCode.NO_SOLUTION,
+            "binds: .*(voltage|torque)",
+        ),
         (jump(0.3, 0.0, 0.16, terrain=Terrain.platform(0.16, 0.25, 0.0)), RefusalCode.CHECK_FAILED, "platform edge"),
         (jump(0.4, 0.0, 0.16), RefusalCode.INVALID_REQUEST, "the ground there is 0.00 m"),
         (MotionRequest(motion="jump", rotation=0.5), RefusalCode.INVALID_REQUEST, "no rotation to set"),

@@ -51,7 +51,9 @@ def test_foot_jacobians_agree_with_pinocchio(robot, model, joints):
     data = robot.model.createData()
     pin.computeJointJacobians(robot.model, data, at_origin(q_j))
     pin.updateFramePlacements(robot.model, data)
-    J = np.vstack([pin.getFrameJacobian(robot.model, data, f, pin.LOCAL_WORLD_ALIGNED)[:3, 6:] for f in robot.contact_frames])
+    J = np.vstack(
+        [pin.getFrameJacobian(robot.model, data, f, pin.LOCAL_WORLD_ALIGNED)[:3, 6:] for f in robot.contact_frames]
+    )
     np.testing.assert_allclose(np.asarray(model.foot_jacobians(q_j).full()), J, atol=TOLERANCE)
 
 

@@ -26,7 +26,9 @@ def double_integrator(solver):
 
 
 def stages(x_0, u_max=np.inf):
-    middle = StageData.free(p=np.zeros(0), x=np.zeros(2), u=np.zeros(1), u_min=-u_max * np.ones(1), u_max=u_max * np.ones(1))
+    middle = StageData.free(
+        p=np.zeros(0), x=np.zeros(2), u=np.zeros(1), u_min=-u_max * np.ones(1), u_max=u_max * np.ones(1)
+    )
     first = StageData.free(p=x_0, x=x_0, u=np.zeros(1), u_min=-u_max * np.ones(1), u_max=u_max * np.ones(1))
     return [first, *[middle] * (N - 1), StageData.free(p=np.zeros(0), x=np.zeros(2))]
 
@@ -54,9 +56,15 @@ def test_an_impossible_problem_is_not_called_solved():
     first, end = Rows(), Rows()
     first.equal("start", x)
     end.equal("goal", x - 10.0)
-    kinds = [first.stage("first", x, u, ca.SX(0, 1), u**2, x + u), end.stage("end", x, ca.SX(0, 1), ca.SX(0, 1), ca.SX(0), None)]
+    kinds = [
+        first.stage("first", x, u, ca.SX(0, 1), u**2, x + u),
+        end.stage("end", x, ca.SX(0, 1), ca.SX(0, 1), ca.SX(0), None),
+    ]
     one = np.ones(1)
-    data = [StageData.free(p=np.zeros(0), x=0 * one, u=0 * one, u_min=-one, u_max=one), StageData.free(p=np.zeros(0), x=0 * one)]
+    data = [
+        StageData.free(p=np.zeros(0), x=0 * one, u=0 * one, u_min=-one, u_max=one),
+        StageData.free(p=np.zeros(0), x=0 * one),
+    ]
     solution = Problem(kinds, SolverOptions()).solve(data)
     assert not solution.converged
     assert solution.max_violation > 1.0

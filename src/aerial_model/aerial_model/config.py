@@ -50,7 +50,9 @@ def check_keys(mapping: Mapping[str, Any], required: Iterable[str], optional: It
     known = required + optional
     for key in mapping:
         if key not in known:
-            raise ConfigurationError(f"{where}: unknown key '{key}'{closest(str(key), known)}; known: {', '.join(known)}")
+            raise ConfigurationError(
+                f"{where}: unknown key '{key}'{closest(str(key), known)}; known: {', '.join(known)}"
+            )
     for key in required:
         if key not in mapping:
             raise ConfigurationError(f"{where}: key '{key}' is missing; required: {', '.join(required)}")

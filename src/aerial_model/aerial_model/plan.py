@@ -92,7 +92,9 @@ class Plan:
             if value.shape != shape:
                 raise InvalidPlanError(f"plan field {name}: expected shape {shape}, found {value.shape}")
             if not np.all(np.isfinite(value)):
-                raise InvalidPlanError(f"plan field {name}: not finite at index {np.argwhere(~np.isfinite(value))[0].tolist()}")
+                raise InvalidPlanError(
+                    f"plan field {name}: not finite at index {np.argwhere(~np.isfinite(value))[0].tolist()}"
+                )
         for name in ("take_off_time", "landing_time", "landing_com_height", "landing_yaw"):
             if not np.isfinite(getattr(self, name)):
                 raise InvalidPlanError(f"plan field {name}: expected a finite number, found {getattr(self, name)}")

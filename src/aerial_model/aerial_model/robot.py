@@ -270,7 +270,9 @@ def _contact_points(entries: Any, model: pin.Model, where: str) -> tuple[Contact
     return points
 
 
-def _per_joint(values: Any, kinds: Mapping[str, Any], joints: tuple[str, ...], where: str, shape: tuple[int, ...]) -> np.ndarray:
+def _per_joint(
+    values: Any, kinds: Mapping[str, Any], joints: tuple[str, ...], where: str, shape: tuple[int, ...]
+) -> np.ndarray:
     """Return ``(n, *shape)`` from a mapping that names kinds of actuators, or single joints (which win over kinds)."""
     if not isinstance(values, Mapping):
         raise ConfigurationError(f"{where}: expected a mapping of joint kinds or joints to values, found {values!r}")
@@ -278,7 +280,9 @@ def _per_joint(values: Any, kinds: Mapping[str, Any], joints: tuple[str, ...], w
     for name in values:
         if name not in kinds and name not in joints:
             known = [*kinds, *joints]
-            raise ConfigurationError(f"{where}: unknown joint or kind '{name}'{closest(str(name), known)}; known: {', '.join(known)}")
+            raise ConfigurationError(
+                f"{where}: unknown joint or kind '{name}'{closest(str(name), known)}; known: {', '.join(known)}"
+            )
     rows = []
     for joint in joints:
         name = joint if joint in values else kind_of[joint]

@@ -31,7 +31,9 @@ class Box:
         object.__setattr__(self, "centre", frozen_array(self.centre, "box centre", (3,)))
         object.__setattr__(self, "size", frozen_array(self.size, "box size", (3,)))
         if np.any(self.size <= 0) or not np.isfinite(self.yaw):
-            raise ValueError(f"a box needs positive side lengths and a finite yaw, found size {self.size}, yaw {self.yaw}")
+            raise ValueError(
+                f"a box needs positive side lengths and a finite yaw, found size {self.size}, yaw {self.yaw}"
+            )
 
     @property
     def top(self) -> float:
@@ -84,7 +86,9 @@ class Terrain:
         """
         middle = edge + HURDLE_THICKNESS / 2
         centre = np.array([middle * np.cos(direction), middle * np.sin(direction), height / 2])
-        return Terrain(boxes=(Box(centre=centre, size=np.array([HURDLE_THICKNESS, HURDLE_WIDTH, height]), yaw=direction),))
+        return Terrain(
+            boxes=(Box(centre=centre, size=np.array([HURDLE_THICKNESS, HURDLE_WIDTH, height]), yaw=direction),)
+        )
 
     @property
     def floor(self) -> float:

@@ -53,7 +53,9 @@ def assemble(
     held = np.vstack([schedule.contact, schedule.contact[-1:]])
     v = np.array(
         [
-            _consistent_velocity(robot, data, q[k], np.concatenate([np.zeros(3), omega[k], rates[k]]), momentum[k], held[k])
+            _consistent_velocity(
+                robot, data, q[k], np.concatenate([np.zeros(3), omega[k], rates[k]]), momentum[k], held[k]
+            )
             for k in range(N + 1)
         ]
     )
@@ -74,7 +76,13 @@ def assemble(
     alpha = take_off.angular_momentum[-1]
     flight_v = np.array(
         [
-            _flying_velocity(robot, data, flight_q[k], flight.joint_velocity[k], np.concatenate([robot.mass * com_velocity[k], alpha]))
+            _flying_velocity(
+                robot,
+                data,
+                flight_q[k],
+                flight.joint_velocity[k],
+                np.concatenate([robot.mass * com_velocity[k], alpha]),
+            )
             for k in range(len(flight_q))
         ]
     )

@@ -68,7 +68,9 @@ def _check_solution(solution: Solution) -> None:
 
 
 def _check_attitude(plan: Plan, schedule: Schedule) -> None:
-    miss = rotation.log(rotation.multiply(rotation.conjugate(schedule.landing_orientation), plan.q[-1, BASE_ORIENTATION]))
+    miss = rotation.log(
+        rotation.multiply(rotation.conjugate(schedule.landing_orientation), plan.q[-1, BASE_ORIENTATION])
+    )
     angle = float(np.linalg.norm(miss))
     if angle > ATTITUDE_TOLERANCE:
         raise _refuse(f"landing attitude: {np.rad2deg(angle):.1f}° off the goal when the flight is integrated finely")

@@ -41,7 +41,6 @@ from aerial_planner.trajectory import TakeOffTrajectory
 from aerial_planner.transcription import Problem, Rows, Solution, SolverOptions, StageData, StageKind
 
 
-
 class Variant(StrEnum):
     """Which actuator constraints a plan obeys (thesis section 3.1.3)."""
 
@@ -70,7 +69,9 @@ class KinoDynamic:
         self._problems: dict[bytes, Problem] = {}
         self._kinds: dict[tuple, StageKind] = {}
 
-    def solve(self, schedule: Schedule, reference: Reference, guess: TakeOffTrajectory) -> tuple[TakeOffTrajectory, Solution]:
+    def solve(
+        self, schedule: Schedule, reference: Reference, guess: TakeOffTrajectory
+    ) -> tuple[TakeOffTrajectory, Solution]:
         """Return the optimum near ``guess`` and the solver's account of it; check the latter before using the former."""
         solution = self.problem(schedule).solve(self._stages(schedule, reference, guess))
         return self._trajectory(schedule, solution), solution
@@ -94,7 +95,7 @@ class KinoDynamic:
         if key in self._kinds:
             return self._kinds[key]
         robot, settings = self.robot, self.settings
-        n, n_c = robot.n_joints, robot.n_contacts
+        n_c = robot.n_contacts
         s = _TakeOffSymbols(robot, self.model, loaded)
 
         dr = s.r - s.r_ref
@@ -198,7 +199,14 @@ class KinoDynamic:
             flight = _FlightSymbols(robot, alpha, quaternion, q_j, omega, p)
             rows = Rows()
             rows.equal("momentum", flight.momentum_gap(self.model))
-            self._kinds[key] = rows.stage("flight", ca.vertcat(alpha, quaternion, q_j), omega, p, self.settings.weights.angular_velocity * ca.sumsqr(omega), flight.step())
+            self._kinds[key] = rows.stage(
+                "flight",
+                ca.vertcat(alpha, quaternion, q_j),
+                omega,
+                p,
+                self.settings.weights.angular_velocity * ca.sumsqr(omega),
+                flight.step(),
+            )
         return self._kinds[key]
 
     def _touchdown_kind(self) -> StageKind:
@@ -217,11 +225,16 @@ class KinoDynamic:
         robot, settings = self.robot, self.settings
         n, N, M = robot.n_joints, len(schedule.contact), schedule.flight_knots
         low, high = robot.planning_range
-        in_range = {"x_min": np.concatenate([np.full(13, -np.inf), low, np.full(n, -np.inf)]), "x_max": np.concatenate([np.full(13, np.inf), high, np.full(n, np.inf)])}
+        in_range = {
+            "x_min": np.concatenate([np.full(13, -np.inf), low, np.full(n, -np.inf)]),
+            "x_max": np.concatenate([np.full(13, np.inf), high, np.full(n, np.inf)]),
+        }
         aware = self.variant is not Variant.KD
         speed = settings.speed_margin * robot.actuators.no_load_speed if aware else np.full(n, np.inf)  # (3.11a)
         before = np.vstack([np.zeros(n), guess.joint_velocity[:-1]])
-        x = np.hstack([guess.com, guess.com_velocity, guess.angular_momentum, guess.orientation, guess.joint_position, before])
+        x = np.hstack(
+            [guess.com, guess.com_velocity, guess.angular_momentum, guess.orientation, guess.joint_position, before]
+        )
         foot_ref = reference.foot_position.ravel()
         path = reference.flight_path
         stages = []
@@ -243,7 +256,13 @@ class KinoDynamic:
                     **({} if k == 0 else in_range),  # where the robot stands is given
                 )
             )
-        p = [[schedule.dt], foot_ref, [schedule.flight_time, settings.landing_lead], reference.landing_com, path.parameters(0)]
+        p = [
+            [schedule.dt],
+            foot_ref,
+            [schedule.flight_time, settings.landing_lead],
+            reference.landing_com,
+            path.parameters(0),
+        ]
         u = [guess.flight_angular_velocity[0], guess.angular_velocity[-1], guess.joint_velocity[-1]]
         u_max = np.concatenate([np.full(6, np.inf), speed])
         stages.append(
@@ -290,9 +309,7 @@ def _joint_inertia(robot: Robot) -> np.ndarray:
 class _TakeOffSymbols:
     """Symbols of a take-off knot and its Euler step (3.5, 3.6)."""
 
-    def __init__(
-        self, robot: Robot, model: BaseFrameModel, loaded: Sequence[bool], *, in_flight: bool = False
-    ) -> None:
+    def __init__(self, robot: Robot, model: BaseFrameModel, loaded: Sequence[bool], *, in_flight: bool = False) -> None:
         n, n_c = robot.n_joints, robot.n_contacts
         self._model = model
         self.r, self.rdot, self.alpha = (ca.SX.sym(name, 3) for name in ("r", "rdot", "alpha"))

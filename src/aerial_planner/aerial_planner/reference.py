@@ -13,7 +13,9 @@ from aerial_planner.schedule import GRAVITY, Schedule
 from aerial_planner.settings import PlannerSettings
 from aerial_planner.symbolic import BaseFrameModel
 
-_TUCKED_AT = 0.3  # share of the flight after which the legs are tucked: early, as front feet meet a platform's edge first
+_TUCKED_AT = (
+    0.3  # share of the flight after which the legs are tucked: early, as front feet meet a platform's edge first
+)
 _READY_AT = 0.9  # share of the flight after which they are in the landing pose
 _LIFT_OFF_RISE = 0.1  # of the centre of mass above its standing height, as a share of it: the reference's
 _STRETCHED_RISE = 0.25  # the same, at the most: the legs' longest way to the tuck starts here
@@ -165,9 +167,7 @@ def _flight_path(schedule: Schedule, robot: Robot, stretched: np.ndarray, landin
     for first, last in ((0, turning), (turning, ready)):
         way, _ = _smooth_step(np.linspace(0.0, 1.0, last - first + 1))
         fraction[first:last] = np.diff(way) / (1 - way[:-1])
-    return FlightPath(
-        dt=dt, turning=turning, ready=ready, tuck=tuck, landing=landing, fraction=fraction
-    )
+    return FlightPath(dt=dt, turning=turning, ready=ready, tuck=tuck, landing=landing, fraction=fraction)
 
 
 def _smooth_step(s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

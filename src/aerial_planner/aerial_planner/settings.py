@@ -29,7 +29,9 @@ class PlannerSettings:
 
     dt: float = 0.01  # of the take-off knots, as in the thesis [s]
     flight_knots: int = 16  # intervals of the flight
-    margin: float = 0.85  # share of torque and voltage limits a plan may use; the rest is for feedback and what (3.14) leaves out
+    margin: float = (
+        0.85  # share of torque and voltage limits a plan may use; the rest is for feedback and what (3.14) leaves out
+    )
     speed_margin: float = 0.9  # share of the no-load speed a plan may use
     force_max: float = 300.0  # greatest normal force of one contact [N]
     force_min: float = 0.0  # least normal force of one loaded contact [N]

@@ -14,7 +14,7 @@ import numpy as np
 
 from aerial_model import rotation
 from aerial_model.contact import friction_pyramid
-from aerial_model.robot import BASE_ORIENTATION, Robot
+from aerial_model.robot import Robot
 from aerial_planner.inverse_kinematics import InverseKinematics
 from aerial_planner.reference import Reference
 from aerial_planner.schedule import GRAVITY, Schedule
@@ -22,7 +22,6 @@ from aerial_planner.settings import PlannerSettings
 from aerial_planner.symbolic import (
     BaseFrameModel,
     attitude_error,
-    conjugate,
     quaternion_product,
     quaternion_step,
     rotation_matrix,
@@ -177,9 +176,7 @@ class SingleRigidBody:
         settings = self.settings
         foot_ref = reference.foot_position.ravel()
         weight = self.robot.mass * GRAVITY
-        x = np.hstack(
-            [reference.com, reference.com_velocity, reference.angular_momentum, reference.orientation]
-        )
+        x = np.hstack([reference.com, reference.com_velocity, reference.angular_momentum, reference.orientation])
         stages = []
         for k, loaded in enumerate(schedule.contact):
             n_f = int(loaded.sum())

@@ -24,6 +24,7 @@ from aerial_planner.symbolic import conjugate, quaternion_product
 _ACTIVE = 1e-3  # an inequality nearer to its bound than this holds the optimum back
 _SAME_TURN = 0.5  # least q_goal · q of an attitude that is the goal's
 
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StageKind:
     """The expressions of one kind of knot; ``next_state`` is None at the last one.
@@ -66,7 +67,9 @@ class StageKind:
     @cached_property
     def gradient(self) -> ca.Function:
         """(z, p) ↦ gradient of the cost."""
-        return ca.Function(self.name + "_grad", [self.z, self.p], [ca.densify(ca.gradient(self.cost, self.z))], {"cse": True})
+        return ca.Function(
+            self.name + "_grad", [self.z, self.p], [ca.densify(ca.gradient(self.cost, self.z))], {"cse": True}
+        )
 
     @cached_property
     def jacobian(self) -> ca.Function:
@@ -146,13 +149,14 @@ class StageData:
         *,
         p: np.ndarray,
         x: np.ndarray,
-        u: np.ndarray = np.zeros(0),
+        u: np.ndarray | None = None,
         x_min: np.ndarray | None = None,
         x_max: np.ndarray | None = None,
         u_min: np.ndarray | None = None,
         u_max: np.ndarray | None = None,
     ) -> StageData:
-        """Return a knot's data with infinite bounds where none are given."""
+        """Return a knot's data with infinite bounds where none are given, and no control where none is."""
+        u = np.zeros(0) if u is None else u
         return StageData(
             p=p,
             x=x,
@@ -278,7 +282,9 @@ class _Layout:
         self.ng = [kind.constraints.numel() for kind in self.kinds]
         for kind, following in zip(self.kinds[:-1], self.kinds[1:], strict=True):
             if kind.n_next != following.x.numel():
-                raise ValueError(f"stage {kind.name} leads to {kind.n_next} states, {following.name} has {following.x.numel()}")
+                raise ValueError(
+                    f"stage {kind.name} leads to {kind.n_next} states, {following.name} has {following.x.numel()}"
+                )
         n_z = np.array([x + u for x, u in zip(self.nx, self.nu, strict=True)])
         n_p = np.array([kind.p.numel() for kind in self.kinds])
         n_rows = np.array([kind.n_next + ng for kind, ng in zip(self.kinds, self.ng, strict=True)])
