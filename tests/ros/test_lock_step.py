@@ -1,0 +1,105 @@
+"""The three nodes in one process and in lock-step: a jump lands, and the same seed gives the same jump."""
+
+import numpy as np
+import pytest
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from std_srvs.srv import SetBool
+
+from aerial_evaluation.landing import OBSERVE_TIME, Tick, judge
+from aerial_model.request import MotionRequest
+from aerial_model.robot import Robot
+from aerial_model.ros import qos
+from aerial_model.ros.messages import from_stamp, plan_from_message, selection_to_message
+from aerial_msgs.msg import GroundTruth, MotionPlan, MotionResult, MotionSelection
+from aerial_msgs.srv import Step
+from aerial_planner.ros.planner_node import PlannerNode
+from aerial_sim.ros.messages import ground_truth_from_message
+from aerial_sim.ros.sim_node import SimNode
+from aerial_wbic.ros.wbic_node import WbicNode
+
+PATIENCE = 120.0  # [s] for a jump on a busy machine
+STAND_PERIODS = 250  # before the selection
+JUMP = MotionRequest(motion="jump", displacement=[0.3, 0.0, 0.0], request_id="jump")
+
+
+class Operator(Node):
+    """Selects a motion and keeps what comes of it."""
+
+    def __init__(self):
+        super().__init__("operator")
+        self.truths, self.plans, self.results = [], [], []
+        self.create_subscription(GroundTruth, "ground_truth", self.truths.append, qos.RECORD)
+        self.create_subscription(MotionPlan, "motion_plan", self.plans.append, qos.EVENT)
+        self.create_subscription(MotionResult, "motion_result", self.results.append, qos.EVENT)
+        self.selections = self.create_publisher(MotionSelection, "motion_selection", qos.EVENT)
+
+    @property
+    def outcomes(self):
+        return [result.outcome for result in self.results]
+
+    @property
+    def time(self):
+        return from_stamp(self.truths[-1].odometry.header.stamp) if self.truths else 0.0
+
+
+@pytest.fixture
+def jump(executor, until):
+    """Run the jump from a new start of all nodes and return the operator."""
+    options = {"real_time": False, "seed": 3, "warm_up": "jump"}
+    parameters = [Parameter(name, value=value) for name, value in options.items()]
+
+    def call(operator, kind, name, request):
+        client = operator.create_client(kind, name)
+        until(client.service_is_ready)
+        future = client.call_async(request)
+        until(future.done)
+        assert future.result().success
+
+    def jump():
+        nodes = [kind(parameter_overrides=parameters) for kind in (SimNode, WbicNode, PlannerNode)]
+        operator = Operator()
+        for node in (*nodes, operator):
+            executor.add_node(node)
+        sim, *others = nodes
+        assert sim.start()
+        call(operator, SetBool, "sim/pause", SetBool.Request(data=True))
+        assert all(node.start() for node in others)
+        until(lambda: operator.count_subscribers("motion_selection") >= 2 and sim.diagnose()[1] == "paused")
+        call(operator, Step, "sim/step", Step.Request(count=STAND_PERIODS))
+        until(lambda: len(operator.truths) == STAND_PERIODS)
+        operator.selections.publish(selection_to_message(JUMP))
+        until(lambda: MotionResult.STARTED in operator.outcomes, PATIENCE)
+        call(operator, SetBool, "sim/pause", SetBool.Request(data=False))
+        start = from_stamp(operator.truths[-1].odometry.header.stamp)
+        until(lambda: operator.time > start + operator.plans[0].landing_time + OBSERVE_TIME, PATIENCE)
+        for node in nodes:
+            node.trigger_deactivate()
+            node.trigger_cleanup()
+        for node in (*nodes, operator):
+            executor.remove_node(node)
+            node.destroy_node()
+        return operator
+
+    return jump
+
+
+def test_a_jump_lands_and_repeats_to_the_last_bit(jump):
+    robot = Robot.load("mini_cheetah")
+    first, second = jump(), jump()
+    plan = plan_from_message(first.plans[0], robot)
+    truths = [ground_truth_from_message(message) for message in first.truths]
+    start = STAND_PERIODS - 1
+    origin, heading = robot.start_frame(truths[start].q)
+    landing = judge(
+        robot,
+        plan,
+        origin=origin,
+        heading=heading,
+        start_time=truths[start].time,
+        ticks=[Tick(truth=truth) for truth in truths],
+    )
+    assert landing.failed == ()
+    again = [ground_truth_from_message(message) for message in second.truths]
+    for one, other in zip(truths, again, strict=False):
+        np.testing.assert_array_equal(one.q, other.q)
