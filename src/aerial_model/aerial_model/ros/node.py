@@ -6,13 +6,14 @@ A node says what it is in three methods: ``configure``, ``cleanup`` and ``diagno
 from __future__ import annotations
 
 import gc
+import signal
 import sys
+import threading
 import traceback
 from collections.abc import Callable
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.signals import SignalHandlerOptions
@@ -33,6 +34,7 @@ class AerialNode(LifecycleNode):
         super().__init__(name, **kwargs)
         self.declare_parameter("robot", "mini_cheetah")
         self.declare_parameter("autostart", True)
+        self._acting = False
 
     def configure(self) -> None:
         """Build what the node works with, what may fail before any interface.
@@ -61,6 +63,11 @@ class AerialNode(LifecycleNode):
         success = TransitionCallbackReturn.SUCCESS
         return self.trigger_configure() == success and self.trigger_activate() == success
 
+    def stop(self) -> None:
+        """Cease to act, if the node does."""
+        if self._acting:
+            self.trigger_deactivate()
+
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Build everything, or say in one sentence why that cannot be."""
         if not self._succeeds(self.configure):
@@ -72,11 +79,13 @@ class AerialNode(LifecycleNode):
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Enable the publishers, then act."""
         result = super().on_activate(state)
-        return result if self._succeeds(self.activate) else TransitionCallbackReturn.FAILURE
+        self._acting = self._succeeds(self.activate)
+        return result if self._acting else TransitionCallbackReturn.FAILURE
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Cease to act, then disable the publishers."""
         self.deactivate()
+        self._acting = False
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -109,19 +118,24 @@ class AerialNode(LifecycleNode):
 
 
 def main(make_node: Callable[[], AerialNode]) -> None:
-    """Run a node as a process until SIGINT or SIGTERM; the exit status is 1 if it could not start."""
-    rclpy.init(signal_handler_options=SignalHandlerOptions.ALL)
-    try:
-        node = make_node()
-        executor = EventsExecutor()
-        executor.add_node(node)
-        if not node.start():
-            sys.exit(1)
-        gc.collect()
-        gc.freeze()  # what is there now stays: later collections need not look at it
-        while rclpy.ok():  # EventsExecutor.spin() would busy-wait without serving anything
-            executor.spin_once(timeout_sec=_SPIN_TIMEOUT)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        rclpy.try_shutdown()
+    """Run a node as a process until SIGINT or SIGTERM; the exit status is 1 if it could not start.
+
+    A signal only asks the loop to end: rclpy's own handlers would invalidate the context under running callbacks.
+    """
+    asked_to_end = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: asked_to_end.set())
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    node = make_node()
+    executor = EventsExecutor()
+    executor.add_node(node)
+    started = node.start()
+    gc.collect()
+    gc.freeze()  # what is there now stays: later collections need not look at it
+    while started and not asked_to_end.is_set():  # EventsExecutor.spin() would busy-wait without serving anything
+        executor.spin_once(timeout_sec=_SPIN_TIMEOUT)
+    node.stop()
+    executor.shutdown()
+    node.destroy_node()
+    rclpy.shutdown()
+    sys.exit(0 if started else 1)
