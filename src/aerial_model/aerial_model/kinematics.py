@@ -36,8 +36,8 @@ class Kinematics:
 class Configuration:
     """Quantities of a robot at one state, in W with Pinocchio's v (base twist in B, linear first).
 
-    Arrays are handed out as copies: Pinocchio's own would change with the next state, or outlive their memory. The large
-    ones are made once per state and are read-only.
+    Arrays are handed out as copies: Pinocchio's own would change with the next state, or outlive their memory. The
+    large ones are made once per state and are read-only.
     """
 
     def __init__(self, robot: Robot, data: pin.Data, q: np.ndarray, v: np.ndarray) -> None:

@@ -2,8 +2,8 @@
 
     estimator → phase → tasks → hierarchy → qp → drive
 
-Without a plan the robot stands. A plan is followed from take-off through flight to its landing time; then the robot comes
-to rest over its feet and stands again, ready for the next.
+Without a plan the robot stands. A plan is followed from take-off through flight to its landing time; then the robot
+comes to rest over its feet and stands again, ready for the next.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from aerial_wbic.tasks import Limbs, attitude_error, prioritized_tasks
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ControllerStatus:
-    """How the controller is doing; errors are plan minus estimate in the start heading frame, zero while no plan is followed."""
+    """How the controller is doing; errors are plan minus estimate in the start heading frame, zero without a plan."""
 
     phase: Phase
     time_in_plan: float  # [s]

@@ -1,17 +1,18 @@
 """Where the robot is and how fast, from inertial unit and joint encoders: a contact-aided Kalman filter.
 
-The attitude comes from the inertial unit; the gyro carries it between samples and a slow correction draws it to what the
-unit reports. Given the attitude, position and velocity of the base and the positions of the contact points on the ground
-obey a linear model; noise is taken to be the same in all directions, so the three axes of W share one covariance and one
-gain: the state is a matrix X ``(2 + n_c, 3)`` with rows [p, v, c_1 …], the covariance P is ``(2 + n_c, 2 + n_c)``.
+The attitude comes from the inertial unit; the gyro carries it between samples and a slow correction draws it to what
+the unit reports. Given the attitude, position and velocity of the base and the positions of the contact points on the
+ground obey a linear model; noise is taken to be the same in all directions, so the three axes of W share one covariance
+and one gain: the state is a matrix X ``(2 + n_c, 3)`` with rows [p, v, c_1 …], the covariance P is
+``(2 + n_c, 2 + n_c)``.
 
     ṗ = v,   v̇ = R f + g + w_a,   ċ_i = u_i + w_c    f: specific force the accelerometer reads
     0 = p + R p_i(q_j) − c_i + w_p                    p_i: centre of contact sphere i in B
     u_i = v + R (ω × p_i + ṗ_i) + w_v                 u_i: velocity of a centre whose sphere rolls
 
-Only loaded points are measured. Where a point touches down is where forward kinematics says it does: nothing is assumed
-about the height of the ground. A loaded point that moves against the filter's belief (not yet down, slipping) is believed
-less in proportion: its noise grows with the square of the disagreement, and it is anchored anew.
+Only loaded points are measured. Where a point touches down is where forward kinematics says it does: nothing is
+assumed about the height of the ground. A loaded point that moves against the filter's belief (not yet down, slipping) is
+believed less in proportion: its noise grows with the square of the disagreement, and it is anchored anew.
 """
 
 from __future__ import annotations

@@ -66,7 +66,7 @@ def consistent_inverse(J: np.ndarray, M_inv: np.ndarray) -> tuple[np.ndarray, in
 
 
 def _is_full_rank(A: np.ndarray) -> bool:
-    """Return whether every row of a symmetric matrix ``(m, m)`` adds to the ones before: the usual case, cheap to see."""
+    """Return whether every row of a symmetric matrix ``(m, m)`` adds to those before: the usual case, cheap to see."""
     try:
         pivots = np.linalg.cholesky(A).diagonal()
     except np.linalg.LinAlgError:

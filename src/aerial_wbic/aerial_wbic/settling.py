@@ -8,7 +8,7 @@ import numpy as np
 class Settling:
     """The response of three equal poles from (x_0, ẋ_0, ẍ_0 = 0) to rest at x_f: it brakes early and returns slowly.
 
-    From x_0 = x_f it goes 0.84 ẋ_0 / ω far, brakes with 0.80 ẋ_0 ω at most, and swings back with no more than 0.08 ẋ_0 ω.
+    From x_0 = x_f it goes 0.84 ẋ_0 / ω far, brakes with 0.80 ẋ_0 ω at most, and swings back with at most 0.08 ẋ_0 ω.
 
     Args:
         x_0: start ``(m,)``.

@@ -84,10 +84,10 @@ def from_plan(sample: plans.Target, gains: BodyGains) -> WholeBodyTarget:
 class Hold:
     """Comes to rest, level, over the centre of the support, and stays there.
 
-    All contact points are taken to be on the ground. The way to rest is one of the centre of mass *relative to the centre
-    of its support* and of the attitude, from how the robot moves at the beginning: neither an early nor a late touchdown
-    makes the error jump. A fall is caught within a given depth; forward speed is braked while the feet bear that load,
-    which is when friction can.
+    All contact points are taken to be on the ground. The way to rest is one of the centre of mass *relative to the
+    centre of its support* and of the attitude, from how the robot moves at the beginning: neither an early nor a late
+    touchdown makes the error jump. A fall is caught within a given depth; forward speed is braked while the feet bear
+    that load, which is when friction can.
 
     Args:
         state: of the robot at the beginning.

@@ -1,7 +1,7 @@
 """The tasks of the whole-body controller in the order of their priority, thesis (3.26)–(3.29).
 
-One function per physical statement. The feedback of (3.22), ẍ_cmd = ẍ_des + K_p (x_des − x) + K_d (ẋ_des − ẋ), is that of
-a velocity that also closes the gap: ẍ_cmd = ẍ_des + K_d (ẋ_ref − ẋ) with ẋ_ref = ẋ_des + K_p / K_d (x_des − x).
+One function per physical statement. The feedback of (3.22), ẍ_cmd = ẍ_des + K_p (x_des − x) + K_d (ẋ_des − ẋ), is that
+of a velocity that also closes the gap: ẍ_cmd = ẍ_des + K_d (ẋ_ref − ẋ) with ẋ_ref = ẋ_des + K_p / K_d (x_des − x).
 """
 
 from __future__ import annotations

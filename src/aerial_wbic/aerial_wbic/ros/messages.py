@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from aerial_msgs.msg import ControllerStatus as ControllerStatusMessage
 from geometry_msgs.msg import Point, Quaternion, Vector3
 from nav_msgs.msg import Odometry
 
 from aerial_model.robot import BASE_ANGULAR, BASE_LINEAR, BASE_ORIENTATION, BASE_POSITION
 from aerial_model.ros.messages import to_stamp
 from aerial_model.state import Estimate
+from aerial_msgs.msg import ControllerStatus as ControllerStatusMessage
 from aerial_wbic.controller import ControllerStatus
 
 ODOMETRY_FRAME = "odom"

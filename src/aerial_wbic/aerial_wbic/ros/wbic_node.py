@@ -1,7 +1,7 @@
 """The controller as a process: a state in, a joint command out; plans and selections in, answers out.
 
-The arrival of a state drives everything; a timer only watches for silence. Nothing that arrives ends the node: what makes
-no sense is answered or logged, and the robot goes on standing.
+The arrival of a state drives everything; a timer only watches for silence. Nothing that arrives ends the node: what
+makes no sense is answered or logged, and the robot goes on standing.
 """
 
 from __future__ import annotations
@@ -156,7 +156,7 @@ class WbicNode(node.AerialNode):
             return True
         gap = measurement.sequence - self._last.state_sequence
         if gap < 0:
-            self.get_logger().info("the robot was reset: starting anew")
+            self.get_logger().info("the robot was reset: starting anew", throttle_duration_sec=1.0)
             self._restart()
         elif gap > 1:
             self._pace.missed_ticks += gap - 1
