@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import re
+import signal
 import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
@@ -67,6 +68,7 @@ def _run(name: str, arguments: list[str]) -> int:
     command.add_arguments(parser)
     _add_common_arguments(parser)
     args = parser.parse_args(join_negative_values(arguments))
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # either way of ending us lets a command clean up
     try:
         with reserved_output() as output:
             report = _report(command, args)
