@@ -163,7 +163,7 @@ def test_equal_seeds_and_commands_agree_to_the_last_bit(robot, hold, noise):
 
 def test_reset_forgets_everything(robot, hold, torque_command):
     fresh, used = Simulation(robot, seed=7), Simulation(robot, seed=6)
-    used.disturb([30.0, 0.0, 0.0], 10.0)
+    used.disturb([30.0, 0.0, 0.0], 10.0, added_mass=2.0, friction_coefficient=0.1)
     advance(used, torque_command(1.0), 0.5)
     assert fields_equal(fresh.measure(), used.reset(7))
     assert all(fields_equal(fresh.step(hold), used.step(hold)) for _ in range(100))
@@ -193,6 +193,7 @@ def test_new_terrain_leaves_the_robot_as_it_is(robot, hold):
     q, v = simulation.state()
     np.testing.assert_array_equal(q, truth.q)
     np.testing.assert_array_equal(v, truth.v)
+    assert simulation.ground_truth().contact.all()
     assert simulation.time == truth.time
     assert simulation.terrain is ahead
     later = advance(simulation, hold, STAND_TIME)

@@ -71,13 +71,14 @@ class Simulation:
         self._start_offset = 0.0 if noise == "off" else START_OFFSET
         self._start_heading = 0.0 if noise == "off" else np.pi
         self._drive = Drive(robot.actuators, steps)
-        self._added_mass = 0.0
-        self._friction_coefficient = FRICTION_COEFFICIENT
         self._use(build(robot, terrain, physics_dt))
         self.reset(seed)
 
     def reset(self, seed: int) -> Measurement:
-        """Put the robot in its home pose, its lowest foot on the ground, at time 0, and draw everything anew."""
+        """Put the robot in its home pose, its lowest foot on the ground, at time 0, and draw everything anew.
+
+        Disturbances end; the terrain stays.
+        """
         random = np.random.default_rng(seed)
         self._sensors = Sensors(self._noise, self.robot.n_joints, random)
         q = self.robot.standing_configuration()
@@ -89,6 +90,7 @@ class Simulation:
         radii = np.array([point.radius for point in self.robot.contact_points])
         q[2] += np.max(self.terrain.height(points) - (points[:, 2] - radii))
         mujoco.mj_resetData(self._world.model, self._data)
+        self.disturb(added_mass=0.0, friction_coefficient=FRICTION_COEFFICIENT)
         self.set_state(q, np.zeros(self.robot.model.nv))
         self._ticks = 0
         self._push_until = 0.0
@@ -138,8 +140,10 @@ class Simulation:
         state = np.empty(mujoco.mj_stateSize(self._world.model, mujoco.mjtState.mjSTATE_INTEGRATION))
         mujoco.mj_getState(self._world.model, self._data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
         self._use(build(self.robot, terrain, self._physics_dt))
+        self._apply_disturbances()
         mujoco.mj_setState(self._world.model, self._data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
         mujoco.mj_forward(self._world.model, self._data)
+        self._contacts.collect(self._data)
 
     def disturb(
         self,
@@ -164,7 +168,7 @@ class Simulation:
             self._added_mass = added_mass
         if friction_coefficient is not None:
             self._friction_coefficient = friction_coefficient
-        self._apply_changes()
+        self._apply_disturbances()
 
     def ground_truth(self) -> GroundTruth:
         """Return what is really so, contacts and torques over the last control period included."""
@@ -229,12 +233,11 @@ class Simulation:
         self._world = world
         self._data = mujoco.MjData(world.model)
         self._contacts = ContactSensing(world)
-        self._model_trunk_mass = float(world.model.body_mass[world.trunk])
-        self._apply_changes()
+        self._trunk_mass = float(world.model.body_mass[world.trunk])
 
-    def _apply_changes(self) -> None:
+    def _apply_disturbances(self) -> None:
         """Give the model the added mass and the ground's friction asked for."""
         model = self._world.model
         model.geom_friction[self._world.ground_geoms, 0] = self._friction_coefficient
-        model.body_mass[self._world.trunk] = self._model_trunk_mass + self._added_mass
+        model.body_mass[self._world.trunk] = self._trunk_mass + self._added_mass
         mujoco.mj_setConst(model, mujoco.MjData(model))

@@ -286,7 +286,7 @@ class SimNode(AerialNode):
         if response.success:
             with self._lock:
                 self._session.simulation.disturb(
-                    np.array(request.force),
+                    np.array(request.force) if request.duration > 0 else None,
                     request.duration,
                     added_mass=request.added_mass if request.has_added_mass else None,
                     friction_coefficient=request.friction_coefficient if request.has_friction_coefficient else None,
