@@ -46,12 +46,6 @@ class ContactSensing:
         model = self._world.model
         return tuple(model.body(body).name for body in np.unique(model.geom_bodyid[others]))
 
-    @property
-    def trunk(self) -> bool:
-        """Whether the robot's root link touched the world."""
-        others = self._touched & ~self._is_point
-        return bool(np.any(self._world.model.geom_bodyid[others] == self._world.trunk))
-
     def forces(self, data: mujoco.MjData) -> np.ndarray:
         """Return the force of the world on each contact point in the last physics step ``(n_c, 3)`` [N] in W."""
         forces = np.zeros((len(self._world.contact_geoms), 3))

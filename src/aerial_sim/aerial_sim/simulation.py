@@ -173,14 +173,15 @@ class Simulation:
     def ground_truth(self) -> GroundTruth:
         """Return what is really so, contacts and torques over the last control period included."""
         q, v = self.state()
+        other_links = self._contacts.other_links
         return GroundTruth(
             time=self.time,
             q=q,
             v=v,
             contact=self._contacts.points,
             force=self._contacts.forces(self._data),
-            other_contacts=self._contacts.other_links,
-            trunk_contact=self._contacts.trunk,
+            other_contacts=other_links,
+            trunk_contact=self._world.trunk_name in other_links,
             requested_torque=self._drive.requested_torque,
             delivered_torque=self._drive.delivered_torque,
             peak_torque_ratio=self._drive.peak_torque_ratio,

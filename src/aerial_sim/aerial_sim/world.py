@@ -48,6 +48,7 @@ class World:
     joint_dof: np.ndarray  # (n,) index into qvel
     contact_geoms: np.ndarray  # (n_c,) id of each contact point's sphere
     trunk: int  # id of the robot's root body
+    trunk_name: str
     ground_geoms: np.ndarray  # ids of floor and boxes
 
     def qpos(self, q: np.ndarray) -> np.ndarray:
@@ -85,6 +86,7 @@ def build(robot: Robot, terrain: Terrain, physics_dt: float) -> World:
         joint_dof=np.array([model.joint(name).dofadr[0] for name in robot.joint_names]),
         contact_geoms=np.array([model.geom(name).id for name in contact_names]),
         trunk=model.body(trunk_name).id,
+        trunk_name=trunk_name,
         ground_geoms=np.array([model.geom(name).id for name in ground_names]),
     )
 

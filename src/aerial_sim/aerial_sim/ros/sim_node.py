@@ -33,6 +33,7 @@ from aerial_sim.session import Session
 from aerial_sim.simulation import Simulation
 
 TELEMETRY_PERIODS = 5  # control periods between two messages for people and tools
+LATE = 0.25  # of a period, by which a tick may begin behind its time and the next still keep to theirs
 MISSED_SHARE_MAX = 0.005  # beyond it diagnostics warn
 WATCH_PERIOD = 0.1  # wall time between two looks at what time waits for [s]
 REPEAT_PERIOD = 0.5  # wall time after which an unanswered state is published again, while time stands still [s]
@@ -149,7 +150,11 @@ class SimNode(AerialNode):
     # --- time --------------------------------------------------------------------------------------------------------
 
     def _pace(self) -> None:
-        """Advance at absolute deadlines; after a delay of more than a period, count on from there."""
+        """Advance at absolute deadlines.
+
+        A state that came out late shifts what follows: the controller has its period, counted from the state, whatever
+        the machine does to this thread.
+        """
         period = self._session.simulation.control_dt
         deadline = time.monotonic()
         while self._active:
@@ -157,9 +162,10 @@ class SimNode(AerialNode):
             spare = deadline - time.monotonic()
             if spare > 0:
                 time.sleep(spare)
-            elif spare < -period:
+            now = time.monotonic()
+            if now - deadline > LATE * period:
                 self._late_ticks += 1
-                deadline = time.monotonic()
+                deadline = now
             with self._lock:
                 if self._session.free:
                     self._advance()
