@@ -65,7 +65,7 @@ class KinoDynamic:
         self.settings = settings
         self.variant = variant
         self.options = options
-        self._joint_inertia = _joint_inertia(robot)
+        self._joint_inertia = joint_inertia(robot)
         self._problems: dict[bytes, Problem] = {}
         self._kinds: dict[tuple, StageKind] = {}
 
@@ -75,6 +75,10 @@ class KinoDynamic:
         """Return the optimum near ``guess`` and the solver's account of it; check the latter before using the former."""
         solution = self.problem(schedule).solve(self._stages(schedule, reference, guess))
         return self._trajectory(schedule, solution), solution
+
+    def violation(self, schedule: Schedule, reference: Reference, trajectory: TakeOffTrajectory) -> float:
+        """Return by how much ``trajectory`` misses any constraint of the problem, SI units."""
+        return self.problem(schedule).violation(self._stages(schedule, reference, trajectory))
 
     def problem(self, schedule: Schedule) -> Problem:
         """Return the problem of a schedule, built at its first use."""
@@ -300,7 +304,7 @@ class KinoDynamic:
         )
 
 
-def _joint_inertia(robot: Robot) -> np.ndarray:
+def joint_inertia(robot: Robot) -> np.ndarray:
     """Return the joints' block of the mass matrix ``(n, n)`` at the home pose, rotor inertia included [kg·m²]."""
     q = robot.standing_configuration()
     return Kinematics(robot).at(q, np.zeros(robot.model.nv)).M[JOINT_VELOCITY, JOINT_VELOCITY]

@@ -203,17 +203,12 @@ class Problem:
 
     def solve(self, stages: Sequence[StageData]) -> Solution:
         """Return the optimum from the stages' guess; check ``converged`` and ``max_violation`` before using it."""
-        w_0 = np.concatenate([np.concatenate([s.x, s.u]) for s in stages])
-        lower_w = np.concatenate([np.concatenate([s.x_min, s.u_min]) for s in stages])
-        upper_w = np.concatenate([np.concatenate([s.x_max, s.u_max]) for s in stages])
-        p = np.concatenate([s.p for s in stages])
+        w_0, p, lower_w, upper_w = _flat(stages)
         lower_g, upper_g = self._layout.lower, self._layout.upper
         result = self._solver(x0=w_0, p=p, lbx=lower_w, ubx=upper_w, lbg=lower_g, ubg=upper_g)
         stats = self._solver.stats()
         w, g = np.asarray(result["x"]).ravel(), np.asarray(result["g"]).ravel()
-        with np.errstate(invalid="ignore"):
-            excess = np.concatenate([lower_w - w, w - upper_w, lower_g - g, g - upper_g])
-        finite = np.all(np.isfinite(w))
+        finite = bool(np.all(np.isfinite(w)))
         x, u = self._layout.split(w)
         at_bound = ~self._layout.equality & (np.minimum(g - lower_g, upper_g - g) < _ACTIVE)
         active = Counter(label for label, hit in zip(self._layout.labels, at_bound, strict=True) if hit)
@@ -224,9 +219,15 @@ class Problem:
             iterations=int(stats.get("iter_count", 0)),
             status=str(stats.get("return_status", stats.get("unified_return_status", ""))),
             converged=bool(stats["success"]) and finite,
-            max_violation=float(np.max(excess, initial=0.0)) if finite else float("inf"),
+            max_violation=_excess(w, lower_w, upper_w, g, lower_g, upper_g) if finite else float("inf"),
             binding=tuple(label for label, _ in active.most_common()),
         )
+
+    def violation(self, stages: Sequence[StageData]) -> float:
+        """Return by how much the stages' guess violates any constraint or bound."""
+        w, p, lower_w, upper_w = _flat(stages)
+        g = np.asarray(self._solver.get_function("nlp_g")(w, p)).ravel()
+        return _excess(w, lower_w, upper_w, g, self._layout.lower, self._layout.upper)
 
     def _build(self) -> ca.Function:
         layout = self._layout
@@ -262,6 +263,21 @@ class Problem:
                 }
             }
         return ca.nlpsol("kino_dynamic", options.solver, nlp, {**common, **settings})
+
+
+def _flat(stages: Sequence[StageData]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return guess, parameters and bounds of all knots in one row each."""
+    guess = [part for s in stages for part in (s.x, s.u)]
+    lower = [part for s in stages for part in (s.x_min, s.u_min)]
+    upper = [part for s in stages for part in (s.x_max, s.u_max)]
+    return np.concatenate(guess), np.concatenate([s.p for s in stages]), np.concatenate(lower), np.concatenate(upper)
+
+
+def _excess(
+    w: np.ndarray, lower_w: np.ndarray, upper_w: np.ndarray, g: np.ndarray, lower_g: np.ndarray, upper_g: np.ndarray
+) -> float:
+    """Return the largest violation of bounds on the variables ``w`` and on the constraints ``g``."""
+    return float(np.max(np.concatenate([lower_w - w, w - upper_w, lower_g - g, g - upper_g]), initial=0.0))
 
 
 @dataclass
