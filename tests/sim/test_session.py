@@ -52,6 +52,11 @@ def test_an_overtaken_command_is_dropped(session, answer):
     assert session.answered
 
 
+def test_a_command_from_before_a_reset_is_dropped(session, answer):
+    answer(late=-5)
+    assert not session.started
+
+
 def test_the_last_command_holds_for_some_ticks_then_the_joints_only_damp(session, torque_command):
     session.offer(torque_command(1.0))
     for _ in range(HOLD_TICKS + 1):
@@ -59,6 +64,14 @@ def test_the_last_command_holds_for_some_ticks_then_the_joints_only_damp(session
         np.testing.assert_allclose(session.measurement.joint_torque, 1.0)
     session.advance()
     assert np.all(session.measurement.joint_torque < 0.9)
+
+
+def test_commands_that_keep_coming_late_still_act(session, torque_command):
+    for _ in range(3 * HOLD_TICKS):
+        session.offer(dataclasses.replace(torque_command(1.0), state_sequence=max(session.measurement.sequence - 1, 0)))
+        session.advance()
+    np.testing.assert_allclose(session.measurement.joint_torque, 1.0)
+    assert session.missed_ticks == 3 * HOLD_TICKS - 1
 
 
 def test_a_pause_stops_time_and_grants_let_some_pass(session, answer):

@@ -8,7 +8,7 @@ from aerial_model.robot import Robot
 from aerial_model.state import Command, Measurement
 from aerial_sim.simulation import Simulation
 
-HOLD_TICKS = 5  # periods for which the drives keep an old command before they only damp
+HOLD_TICKS = 5  # periods by which a command may be late before the drives only damp
 SILENCE_DAMPING = 2.0  # of every joint then, as motor boards do by themselves [N·m·s/rad]
 
 
@@ -26,7 +26,6 @@ class Session:
         self.missed_ticks = 0  # of them, those whose command was not there in time
         self.granted = 0  # periods that may still pass in spite of a pause
         self._command: Command | None = None
-        self._silent_ticks = 0
         self._limp = _damping(simulation.robot)
 
     @property
@@ -42,7 +41,12 @@ class Session:
     @property
     def answered(self) -> bool:
         """Whether the command for the present state is there."""
-        return self._command is not None and self._command.state_sequence == self.measurement.sequence
+        return self._command is not None and self._age == 0
+
+    @property
+    def _age(self) -> int:
+        """How many states ago the newest command was due."""
+        return self.measurement.sequence - self._command.state_sequence
 
     @property
     def free(self) -> bool:
@@ -50,25 +54,25 @@ class Session:
         return self.started and self.awaited is None and (not self.paused or self.granted > 0)
 
     def offer(self, command: Command) -> None:
-        """Take a command, unless it answers an older state than the last one did."""
-        if self._command is None or command.state_sequence >= self._command.state_sequence:
+        """Take a command, unless a newer one came before it, or it answers a state from before a reset."""
+        newest = -1 if self._command is None else self._command.state_sequence
+        if newest <= command.state_sequence <= self.measurement.sequence:
             self._command = command
 
     def advance(self) -> Measurement:
         """Let one control period pass and return the state after it.
 
-        Without an answer to the present state the drives keep the last command, for ``HOLD_TICKS`` periods.
+        The drives keep the newest command until it is older than ``HOLD_TICKS`` periods.
         """
-        self._silent_ticks = 0 if self.answered else self._silent_ticks + 1
         self.ticks += 1
-        self.missed_ticks += self._silent_ticks > 0
+        self.missed_ticks += not self.answered
         self.granted = max(self.granted - 1, 0) if self.paused else 0
-        held = self._command if self._silent_ticks <= HOLD_TICKS else self._limp
-        return self.simulation.step(held or self._limp)
+        fresh = self._command is not None and self._age <= HOLD_TICKS
+        return self.simulation.step(self._command if fresh else self._limp)
 
     def reset(self, seed: int) -> Measurement:
         """Begin anew and wait for a first command; a pause stays."""
-        self.ticks = self.missed_ticks = self.granted = self._silent_ticks = 0
+        self.ticks = self.missed_ticks = self.granted = 0
         self.awaited = self._command = None
         return self.simulation.reset(seed)
 

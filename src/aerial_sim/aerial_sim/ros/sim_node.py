@@ -35,6 +35,7 @@ from aerial_sim.simulation import Simulation
 TELEMETRY_PERIODS = 5  # control periods between two messages for people and tools
 LATE = 0.25  # of a period, by which a tick may begin behind its time and the next still keep to theirs
 MISSED_SHARE_MAX = 0.005  # beyond it diagnostics warn
+ROUND_TRIP_WINDOW = 64  # states whose answers are timed, however late
 WATCH_PERIOD = 0.1  # wall time between two looks at what time waits for [s]
 REPEAT_PERIOD = 0.5  # wall time after which an unanswered state is published again, while time stands still [s]
 PLAN_TIMEOUT = 10.0  # wall time for which lock-step waits for the answer to a selection … [s]
@@ -69,7 +70,7 @@ class SimNode(AerialNode):
         self._active = False
         self._moving = False  # a motion runs: no time to rebuild the terrain
         self._pacer: threading.Thread | None = None
-        self._published_at = 0.0  # when the present state was published, monotonic [s]
+        self._published_at = [0.0] * ROUND_TRIP_WINDOW  # of the last states, monotonic [s]
         self._wait_until = 0.0  # when lock-step stops waiting for a plan, monotonic [s]
         self._round_trip = Latency()
         self._late_ticks = 0
@@ -188,7 +189,7 @@ class SimNode(AerialNode):
 
     def _publish_state(self) -> None:
         self._states.publish(state_to_message(self._session.measurement))
-        self._published_at = time.monotonic()
+        self._published_at[self._session.measurement.sequence % ROUND_TRIP_WINDOW] = time.monotonic()
 
     def _watch(self) -> None:
         """While time stands still, repeat a state nobody has answered, and do not wait for a plan for ever."""
@@ -196,7 +197,8 @@ class SimNode(AerialNode):
         with self._lock:
             session = self._session
             waits = not session.answered and (not self._real_time or not session.started)
-            if self._active and waits and now - self._published_at > REPEAT_PERIOD:
+            silence = now - self._published_at[session.measurement.sequence % ROUND_TRIP_WINDOW]
+            if self._active and waits and silence > REPEAT_PERIOD:
                 self._publish_state()
             if session.awaited is not None and now > self._wait_until:
                 self.get_logger().warning(f"selection '{session.awaited}' got no answer: time goes on")
@@ -211,10 +213,10 @@ class SimNode(AerialNode):
             self._rejected_commands += 1
             self.get_logger().error(str(error), throttle_duration_sec=1.0)
             return
+        received = time.monotonic()
         with self._lock:
-            in_time = command.state_sequence == self._session.measurement.sequence
-            if in_time and not self._session.answered:
-                self._round_trip.add(time.monotonic() - self._published_at)
+            if 0 <= self._session.measurement.sequence - command.state_sequence < ROUND_TRIP_WINDOW:
+                self._round_trip.add(received - self._published_at[command.state_sequence % ROUND_TRIP_WINDOW])
             self._session.offer(command)
         self._go_on()
 
