@@ -7,7 +7,7 @@ import math
 import os
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 from typing import Any, TextIO
 
@@ -39,7 +39,7 @@ def reserved_output() -> Iterator[TextIO]:
     saved = os.dup(1)
     os.dup2(2, 1)
     try:
-        with os.fdopen(os.dup(saved), "w", encoding="utf-8") as output:
+        with os.fdopen(os.dup(saved), "w", encoding="utf-8") as output, redirect_stdout(sys.stderr):
             yield output
     finally:
         sys.stdout.flush()

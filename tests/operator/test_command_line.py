@@ -1,0 +1,167 @@
+"""The contract of the command line."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+import yaml
+
+from aerial_model.plan_file import load_plan
+from aerial_model.robot import Robot, known_robots
+
+PLAN_KEYS = {
+    *("motion", "robot", "variant", "warm_start", "solver", "success", "total_time_s", "solve_time_s", "srbm_time_s"),
+    *("iterations", "max_violation", "peak_torque_ratio", "peak_voltage_ratio", "peak_speed_ratio"),
+    *("take_off_time_s", "flight_time_s", "rotation_deg", "landing_position_m", "refusal"),
+}
+SIMULATION_KEYS = {
+    *("landed", "checks", "tilt_deg", "height_m", "position_error_m", "rotation_deg", "rotation_error_deg", "apex_m"),
+    *("peak_torque_ratio", "peak_voltage_ratio", "tick_us", "real_time_factor", "plan", "seed"),
+}
+
+
+@pytest.fixture(scope="module")
+def planned(aerial_process, tmp_path_factory):
+    file = tmp_path_factory.mktemp("plan") / "forward"
+    return aerial_process("plan", "jump", "--to", "0.3,0,0", "--json", "--out", file), file
+
+
+@pytest.fixture(scope="module")
+def simulated(aerial_process):
+    return aerial_process("simulate", "jump", "--to", "-0.2,0,0", "--seed", 3, "--json")
+
+
+def test_plan_prints_one_object_with_all_figures(planned):
+    ended, _ = planned
+    assert ended.status == 0
+    assert ended.figures.keys() >= PLAN_KEYS
+    assert ended.figures["success"]
+    assert ended.figures["refusal"] is None
+    np.testing.assert_allclose(ended.figures["landing_position_m"], [0.3, 0.0, 0.0], atol=1e-9)
+
+
+def test_plan_saves_the_plan_it_reports(planned):
+    ended, file = planned
+    plan = load_plan(file, Robot.load("mini_cheetah"))
+    assert plan.take_off_time == ended.figures["take_off_time_s"]
+
+
+def test_plan_tells_a_person_the_same(aerial):
+    ended = aerial("plan", "jump", "--to", "0.3,0,0")
+    assert ended.status == 0
+    assert "landing at" in ended.output
+    assert "peak voltage" in ended.output
+
+
+def test_simulate_prints_one_object_with_all_figures(simulated):
+    assert simulated.status == 0
+    assert simulated.figures.keys() >= SIMULATION_KEYS
+    assert simulated.figures["plan"].keys() >= PLAN_KEYS
+    assert simulated.figures["tick_us"].keys() == {"p50", "p99", "max"}
+    assert simulated.figures["seed"] == 3
+
+
+def test_simulate_succeeds_when_the_robot_landed(simulated):
+    assert simulated.figures["landed"]
+    assert all(simulated.figures["checks"].values())
+
+
+def test_simulate_tells_a_person_and_draws_a_picture(aerial, tmp_path):
+    ended = aerial("simulate", "jump", "--to", "0.2,0", "--noise", "off", "--picture", tmp_path / "jump.png")
+    assert ended.status == 0
+    assert "landed" in ended.output
+    assert (tmp_path / "jump.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["jmup"], "unknown_motion", "did you mean 'jump'"),
+        (["jump", "--to", "3,0,0"], "out_of_reach", "out of reach"),
+        (["jump", "--variant", "XYZ"], "invalid_request", "unknown variant 'XYZ'"),
+        (["jump", "--to", "0.6,0,0", "--platform", "0.16"], "invalid_request", "the ground there is 0.16 m high"),
+    ],
+)
+def test_a_refused_plan_has_a_code_and_one_sentence(aerial, arguments, code, words):
+    ended = aerial("plan", *arguments, "--json")
+    assert ended.status == 1
+    assert ended.figures.keys() >= PLAN_KEYS
+    assert not ended.figures["success"]
+    assert ended.figures["refusal"]["code"] == code
+    assert words in ended.figures["refusal"]["reason"]
+    assert ended.errors.count("\n") == 1
+    assert words in ended.errors
+
+
+def test_a_refused_simulation_has_not_landed(aerial):
+    ended = aerial("simulate", "jump", "--to", "3,0,0", "--json")
+    assert ended.status == 1
+    assert not ended.figures["landed"]
+    assert ended.figures["refusal"]["code"] == "out_of_reach"
+
+
+def test_a_robot_folder_without_a_key_is_one_sentence(aerial, tmp_path):
+    folder = shutil.copytree(known_robots()["mini_cheetah"], tmp_path / "robot")
+    data = yaml.safe_load((folder / "robot.yaml").read_text())
+    del data["bus_voltage"]
+    (folder / "robot.yaml").write_text(yaml.safe_dump(data))
+    ended = aerial("plan", "jump", "--robot", folder, "--json")
+    assert ended.status == 1
+    assert "key 'bus_voltage' is missing" in ended.figures["refusal"]["reason"]
+    assert ended.errors.count("\n") == 1
+
+
+def test_a_misspelt_setting_is_one_sentence(aerial):
+    ended = aerial("simulate", "jump", "--set", "controller.weight_bse=1")
+    assert ended.status == 1
+    assert ended.output.strip() == ""
+    assert "unknown key 'weight_bse' (did you mean 'weight_base'?)" in ended.errors
+    assert "Traceback" not in ended.errors
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "which command?"),
+        (["pln"], "no command 'pln' (did you mean 'plan'?)"),
+        (["plan"], "MOTION"),
+        (["plan", "jump", "--to", "here"], "such as 0.3,0,0"),
+        (["plan", "jump", "--seed", "x"], "--seed"),
+        (["plan", "jump", "--edge", "1"], "none is asked for"),
+        (["simulate", "jump", "--noise", "loud"], "'nominal', 'off'"),
+    ],
+)
+def test_a_usage_error_ends_with_status_2(aerial, arguments, words):
+    ended = aerial(*arguments)
+    assert ended.status == 2
+    assert ended.output == ""
+    assert words in ended.errors
+
+
+def test_a_usage_error_keeps_to_the_contract_of_json(aerial):
+    ended = aerial("plan", "jump", "--to", "here", "--json")
+    assert ended.status == 2
+    assert ended.figures["refusal"]["code"] == "usage"
+
+
+@pytest.mark.parametrize("command", ["demo", "plan", "simulate", "up", "select"])
+def test_every_command_explains_itself(aerial, command):
+    ended = aerial(command, "--help")
+    assert ended.status == 0
+    for option in ("--robot", "--seed", "--json"):
+        assert option in ended.output
+
+
+def test_the_overview_names_every_command(aerial):
+    ended = aerial("--help")
+    assert ended.status == 0
+    for command in ("demo", "test", "plan", "simulate", "up", "select", "run"):
+        assert f"  {command} " in ended.output
+
+
+def test_select_says_when_nobody_is_there(aerial):
+    ended = aerial("select", "jump", "--json")
+    assert ended.status == 1
+    assert ended.figures["refusal"]["code"] == "timeout"
+    assert "./aerial up" in json.dumps(ended.figures)
