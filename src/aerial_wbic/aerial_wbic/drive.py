@@ -33,7 +33,7 @@ class Drive:
         """Return the command for an acceleration and forces that obey the base's equations of motion.
 
         τ = joint rows of H q̈ + C q̇ + G − J_cᵀ f_r, plus the friction of the joints moving at q̇_ref. Damping about
-        q̇_ref rides along.
+        q̇_ref rides along. Whatever happened before, a command is finite: else the joints are only damped.
 
         Args:
             state: of the robot.
@@ -43,6 +43,8 @@ class Drive:
         """
         velocity = v_ref[JOINT_VELOCITY]
         torque = inverse_dynamics(state, solution) + self._law.friction(velocity, self._stiction_speed)
+        if not np.isfinite(torque).all():
+            return self.resting(None, measurement)
         command = Command(
             torque=torque,
             position=measurement.joint_position,

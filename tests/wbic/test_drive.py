@@ -1,0 +1,107 @@
+"""Torques against Pinocchio's forward dynamics, friction, and the count of what motors cannot give."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from aerial_model.robot import JOINT_VELOCITY
+from aerial_model.state import Measurement
+from aerial_wbic.drive import Drive, inverse_dynamics
+from aerial_wbic.qp import ForceOptimization, Solution
+from aerial_wbic.target import PostureTarget
+
+ACCELERATION_TOLERANCE = 1e-6  # [m/s²], [rad/s²]
+
+
+@pytest.fixture
+def drive(robot, gains):
+    return Drive(robot, gains)
+
+
+def measured(state):
+    return Measurement(
+        time=1.5,
+        sequence=7,
+        orientation=state.base_orientation,
+        angular_velocity=state.v[3:6],
+        linear_acceleration=np.zeros(3),
+        joint_position=state.q[7:],
+        joint_velocity=state.v[6:],
+        joint_torque=np.zeros(len(state.v) - 6),
+    )
+
+
+@pytest.mark.parametrize("contact", [[1, 1, 1, 1], [0, 1, 0, 0], [0, 0, 0, 0]], ids=["four", "one", "no"])
+@pytest.mark.parametrize("seed", range(5))
+def test_torque_reproduces_the_acceleration(robot, gains, state_at, contact, seed):
+    state, random = state_at(seed), np.random.default_rng(seed)
+    optimization = ForceOptimization(robot, gains.weight_base, gains.weight_force)
+    f_cmd = random.normal([0, 0, 30.0], 5.0, (4, 3))
+    solution = optimization.solve(state, 5 * random.normal(size=len(state.v)), f_cmd, np.array(contact, dtype=bool))
+    torque = np.concatenate([np.zeros(6), inverse_dynamics(state, solution)])
+    torque += np.einsum("ikv,ik->v", state.J_contacts, solution.force)
+    vdot = pin.aba(robot.model, robot.model.createData(), state.q, state.v, torque)
+    np.testing.assert_allclose(vdot, solution.vdot, atol=ACCELERATION_TOLERANCE)
+
+
+def test_friction_of_the_reference_velocity_is_fed_forward(robot, gains, drive, state_at):
+    state = state_at(0)
+    solution = Solution(vdot=np.zeros(len(state.v)), force=np.zeros((4, 3)), solved=True)
+    v_ref = np.zeros(len(state.v))
+    still = drive.command(state, solution, v_ref, measured(state))
+    v_ref[JOINT_VELOCITY] = 10 * gains.stiction_speed
+    moving = drive.command(state, solution, v_ref, measured(state))
+    expected = robot.actuators.dry_friction + robot.actuators.damping * 10 * gains.stiction_speed
+    np.testing.assert_allclose(moving.torque - still.torque, expected, rtol=1e-6)
+    np.testing.assert_array_equal(moving.velocity, v_ref[JOINT_VELOCITY])
+
+
+def test_a_command_names_the_measurement_it_answers(drive, state_at):
+    state = state_at(moving=False)
+    solution = Solution(vdot=np.zeros(len(state.v)), force=np.zeros((4, 3)), solved=True)
+    command = drive.command(state, solution, np.zeros(len(state.v)), measured(state))
+    assert (command.state_time, command.state_sequence) == (1.5, 7)
+
+
+@pytest.mark.parametrize(("acceleration", "saturated"), [(0.0, 0), (1e5, 1)])
+def test_ticks_beyond_a_limit_are_counted_and_asked_for_all_the_same(drive, state_at, acceleration, saturated):
+    state = state_at(moving=False)
+    vdot = np.zeros(len(state.v))
+    vdot[JOINT_VELOCITY] = acceleration
+    solution = Solution(vdot=vdot, force=np.zeros((4, 3)), solved=True)
+    command = drive.command(state, solution, np.zeros(len(state.v)), measured(state))
+    np.testing.assert_allclose(command.torque, inverse_dynamics(state, solution))
+    assert drive.saturated_ticks == saturated
+
+
+def test_a_voltage_beyond_the_bus_counts_too(robot, drive, state_at):
+    state = state_at(moving=False)
+    state.v[JOINT_VELOCITY] = 0.99 * robot.actuators.no_load_speed
+    solution = Solution(vdot=np.zeros(len(state.v)), force=np.zeros((4, 3)), solved=True)
+    drive.command(state, solution, 2 * state.v, measured(state))
+    assert drive.saturated_ticks == 1
+
+
+def test_a_stopped_robot_only_resists_motion(gains, drive, state_at):
+    command = drive.resting(None, measured(state_at(0)))
+    assert not command.torque.any()
+    assert not command.stiffness.any()
+    assert not command.velocity.any()
+    assert np.all(command.damping == gains.stop_damping)
+
+
+def test_a_posture_is_left_to_the_boards(gains, drive, robot, state_at):
+    posture = PostureTarget(joint_position=robot.poses["tuck"], joint_velocity=np.ones(robot.n_joints))
+    command = drive.resting(posture, measured(state_at(0)))
+    np.testing.assert_array_equal(command.position, robot.poses["tuck"])
+    assert np.all(command.stiffness == gains.posture_stiffness)
+
+
+def test_a_command_is_always_finite(gains, drive, state_at):
+    state = state_at(moving=False)
+    solution = Solution(vdot=np.full(len(state.v), np.nan), force=np.zeros((4, 3)), solved=False)
+    command = drive.command(state, solution, np.zeros(len(state.v)), measured(state))
+    assert not command.torque.any()
+    assert np.all(command.damping == gains.stop_damping)

@@ -1,0 +1,125 @@
+"""The force optimization against its own conditions: equations of motion, pyramids, optimality; and its one fallback."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scipy.optimize import nnls
+
+from aerial_model.contact import friction_pyramid
+from aerial_model.robot import BASE_TWIST
+from aerial_wbic.qp import ForceOptimization, Solution
+from aerial_wbic.target import shared_load
+
+EQUATION_TOLERANCE = 1e-8  # [N], [N·m]
+FORCE_TOLERANCE = 0.1  # that a force may leave the pyramid [N]
+GRADIENT_TOLERANCE = 0.03  # of the cost's gradient, relative to its largest part
+ACTIVE = 0.3  # slack below which a face of the pyramid is taken to bear [N]
+
+contacts = st.lists(st.booleans(), min_size=4, max_size=4).map(np.array)
+any_state = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=40, deadline=None)
+
+
+@pytest.fixture
+def optimization(robot, gains):
+    return ForceOptimization(robot, gains.weight_base, gains.weight_force)
+
+
+def problem(state, seed):
+    """An acceleration to command and forces to start from, of the size a jump has."""
+    random = np.random.default_rng(seed)
+    return 5.0 * random.normal(size=len(state.v)), shared_load(state, np.zeros(3)) + random.normal(0, 5.0, (4, 3))
+
+
+def residual(state, solution):
+    """Base rows of H q̈ + C q̇ + G − J_cᵀ f."""
+    forces = np.einsum("ikv,ik->v", state.J_contacts, solution.force)
+    return (state.M @ solution.vdot + state.nle - forces)[BASE_TWIST]
+
+
+@any_state
+@given(seed=st.integers(0, 10**6), contact=contacts)
+def test_the_base_obeys_the_equations_of_motion(optimization, state_at, seed, contact):
+    state = state_at(seed)
+    vdot_cmd, f_cmd = problem(state, seed)
+    solution = optimization.solve(state, vdot_cmd, f_cmd, contact)
+    np.testing.assert_allclose(residual(state, solution), 0.0, atol=EQUATION_TOLERANCE)
+    np.testing.assert_array_equal(solution.vdot[6:], vdot_cmd[6:])
+
+
+@any_state
+@given(seed=st.integers(0, 10**6), contact=contacts)
+def test_forces_stay_in_the_pyramid_and_out_of_the_air(optimization, robot, state_at, seed, contact):
+    state = state_at(seed)
+    solution = optimization.solve(state, *problem(state, seed), contact)
+    slack = solution.force @ friction_pyramid(robot.friction_coefficient).T
+    assert solution.solved
+    assert slack.min() > -FORCE_TOLERANCE
+    assert not solution.force[~contact].any()
+
+
+@any_state
+@given(seed=st.integers(0, 10**6), contact=contacts.filter(np.any))
+def test_no_other_forces_cost_less(optimization, robot, gains, state_at, seed, contact):
+    """The gradient of the cost over the forces is a non-negative sum of the faces that bear: KKT of a convex problem."""
+    state = state_at(seed)
+    vdot_cmd, f_cmd = problem(state, seed)
+    solution = optimization.solve(state, vdot_cmd, f_cmd, contact)
+    base = (solution.vdot - vdot_cmd)[BASE_TWIST]
+    lift = np.linalg.solve(state.M[BASE_TWIST, BASE_TWIST], state.J_contacts[contact, :, BASE_TWIST].reshape(-1, 6).T)
+    change = (solution.force - f_cmd)[contact].ravel()
+    parts = gains.weight_base * lift.T @ base, gains.weight_force * change
+    W = np.kron(np.eye(contact.sum()), friction_pyramid(robot.friction_coefficient))
+    bearing = W[W @ solution.force[contact].ravel() < ACTIVE]
+    _, left = nnls(bearing.T, sum(parts)) if len(bearing) else (None, np.linalg.norm(sum(parts)))
+    assert left < GRADIENT_TOLERANCE * (1 + max(np.abs(part).max() for part in parts))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_in_flight_the_base_falls_as_it_must(optimization, robot, state_at, seed):
+    state = state_at(seed)
+    solution = optimization.solve(state, problem(state, seed)[0], np.zeros((4, 3)), np.zeros(4, dtype=bool))
+    torque = state.M[6:] @ solution.vdot + state.nle[6:]
+    expected = pin.aba(robot.model, robot.model.createData(), state.q, state.v, np.concatenate([np.zeros(6), torque]))
+    np.testing.assert_allclose(solution.vdot, expected, atol=1e-6)
+
+
+def test_commanded_forces_that_fit_are_taken(optimization, state_at):
+    state = state_at(moving=False)
+    load = shared_load(state, np.zeros(3))
+    solution = optimization.solve(state, np.zeros(len(state.v)), load, np.ones(4, dtype=bool))
+    np.testing.assert_allclose(solution.force, load, atol=0.05)
+
+
+def test_equal_input_gives_equal_output(robot, gains, state_at):
+    def run() -> list[Solution]:
+        optimization = ForceOptimization(robot, gains.weight_base, gains.weight_force)
+        states = [(state_at(seed), seed) for seed in range(5)]
+        return [optimization.solve(state, *problem(state, seed), np.ones(4, dtype=bool)) for state, seed in states]
+
+    for first, second in zip(run(), run(), strict=True):
+        np.testing.assert_array_equal(first.force, second.force)
+
+
+def test_a_failed_solve_falls_back_and_the_next_one_works(optimization, state_at):
+    state = state_at(1)
+    vdot_cmd, f_cmd = problem(state, 1)
+    contact = np.ones(4, dtype=bool)
+    good = optimization.solve(state, vdot_cmd, f_cmd, contact)
+    assert not optimization.solve(state, vdot_cmd * np.nan, f_cmd, contact).solved
+    again = optimization.solve(state, vdot_cmd, f_cmd, contact)
+    assert again.solved
+    np.testing.assert_allclose(again.force, good.force, atol=0.1)
+
+
+def test_the_fallback_keeps_the_pyramid_and_the_equations_of_motion(optimization, robot, state_at, monkeypatch):
+    monkeypatch.setattr("aerial_wbic.qp._Program.solve", lambda *_: None)
+    state = state_at(2)
+    vdot_cmd, f_cmd = problem(state, 2)
+    solution = optimization.solve(state, vdot_cmd, f_cmd, np.ones(4, dtype=bool))
+    assert not solution.solved
+    assert (solution.force @ friction_pyramid(robot.friction_coefficient).T).min() > -FORCE_TOLERANCE
+    np.testing.assert_allclose(residual(state, solution), 0.0, atol=EQUATION_TOLERANCE)

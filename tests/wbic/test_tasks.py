@@ -1,0 +1,162 @@
+"""Each task against what it says: accelerations integrate to what was asked, errors close, limbs are told apart."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from aerial_model import rotation
+from aerial_model.kinematics import Kinematics
+from aerial_model.robot import JOINT_POSITION, JOINT_VELOCITY
+from aerial_wbic.hierarchy import prioritized
+from aerial_wbic.target import BodyTarget, WholeBodyTarget
+from aerial_wbic.tasks import (
+    Limbs,
+    angular_momentum_task,
+    attitude_error,
+    base_task,
+    limb_task,
+    prioritized_tasks,
+)
+
+STEP = 1e-5  # of finite differences [s]
+DERIVATIVE_TOLERANCE = 1e-3  # [m/s²], [rad/s²], [N·m]
+ROUNDING = 1e-8
+ACCELERATION_MAX = 1e4  # [rad/s²] for an error of 0.1 m, however straight the leg
+
+ALL = np.ones(4, dtype=bool)
+NONE = np.zeros(4, dtype=bool)
+ONE = np.array([False, True, False, False])
+
+
+@pytest.fixture
+def limbs(robot):
+    return Limbs(robot)
+
+
+@pytest.fixture
+def target_at(robot, gains):
+    """A target that a state meets exactly, for loaded points ``contact``; ``changes`` move its body."""
+
+    def target_at(state, contact, **changes):
+        zero = np.zeros(3)
+        body = {
+            "com": state.com,
+            "com_velocity": state.com_velocity,
+            "com_acceleration": zero,
+            "orientation": state.base_orientation,
+            "angular_velocity": state.R_WB @ state.v[3:6],
+            "angular_acceleration": zero,
+            "gains": gains.follow,
+        }
+        return WholeBodyTarget(
+            body=BodyTarget(**{**body, **changes}),
+            joint_position=state.q[JOINT_POSITION],
+            joint_velocity=state.v[JOINT_VELOCITY],
+            joint_acceleration=np.zeros(robot.n_joints),
+            angular_momentum=state.angular_momentum,
+            angular_momentum_rate=zero,
+            force=np.zeros((robot.n_contacts, 3)),
+            contact=contact,
+        )
+
+    return target_at
+
+
+def after(robot, state, vdot):
+    """The robot a moment later, accelerating by ``vdot``."""
+    v = state.v + vdot * STEP
+    q = pin.integrate(robot.model, state.q, (state.v + v) / 2 * STEP)
+    return Kinematics(robot).at(q, v)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_loaded_points_do_not_accelerate(robot, limbs, gains, state_at, target_at, seed):
+    state = state_at(seed)
+    task = limb_task(state, target_at(state, ALL), limbs.swinging(ALL), gains.swing_joint)
+    vdot, _ = prioritized(state.M_inv, [task])
+    later = after(robot, state, vdot)
+    change = [later.contact_velocity(i) - state.contact_velocity(i) for i in range(4)]
+    np.testing.assert_allclose(np.array(change) / STEP, 0.0, atol=DERIVATIVE_TOLERANCE)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_base_task_accelerates_attitude_and_centre_of_mass_as_asked(robot, state_at, target_at, seed):
+    state = state_at(seed)
+    asked, turned = np.array([1.0, -2.0, 3.0]), np.array([-3.0, 1.0, 2.0])
+    task = base_task(state, target_at(state, ALL, com_acceleration=asked, angular_acceleration=turned).body)
+    vdot, _ = prioritized(state.M_inv, [task])
+    later = after(robot, state, vdot)
+    spin = (later.R_WB @ later.v[3:6] - state.R_WB @ state.v[3:6]) / STEP
+    np.testing.assert_allclose((later.com_velocity - state.com_velocity) / STEP, asked, atol=DERIVATIVE_TOLERANCE)
+    np.testing.assert_allclose(spin, turned, atol=DERIVATIVE_TOLERANCE)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_angular_momentum_changes_at_the_rate_asked_for(robot, gains, state_at, target_at, seed):
+    state = state_at(seed)
+    task = angular_momentum_task(state, target_at(state, ALL), gains.angular_momentum_damping)
+    vdot, _ = prioritized(state.M_inv, [task])
+    later = after(robot, state, vdot)
+    change = (later.angular_momentum - state.angular_momentum) / STEP
+    np.testing.assert_allclose(change, 0.0, atol=DERIVATIVE_TOLERANCE)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_feedback_is_that_of_the_reference_velocity(state_at, target_at, gains, seed):
+    state = state_at(seed)
+    ahead, faster = np.array([0.01, -0.02, 0.03]), np.array([0.1, 0.2, -0.3])
+    target = target_at(state, ALL, com=state.com + ahead, com_velocity=state.com_velocity + faster)
+    at_target = target_at(state, ALL)
+    feedback = base_task(state, target.body).a - base_task(state, at_target.body).a
+    position = gains.follow.position
+    np.testing.assert_allclose(feedback[3:], position.stiffness * ahead + position.damping * faster, atol=ROUNDING)
+
+
+def test_attitude_error_turns_the_base_to_where_it_should_be():
+    actual = rotation.exp(np.array([0.3, -0.2, 0.5]))
+    turn = np.array([0.1, 0.2, -0.1])
+    desired = rotation.multiply(rotation.exp(turn), actual)
+    np.testing.assert_allclose(attitude_error(desired, actual), turn, atol=ROUNDING)
+    np.testing.assert_allclose(attitude_error(-desired, actual), turn, atol=ROUNDING)
+
+
+def test_a_limb_swings_when_its_point_is_in_the_air(robot, limbs):
+    swinging = [robot.joint_names[j] for j in limbs.swinging(~ONE)]
+    assert swinging == ["fl_abad", "fl_hip", "fl_knee"]
+    assert list(limbs.swinging(NONE)) == list(range(robot.n_joints))
+    assert not len(limbs.swinging(ALL))
+
+
+@pytest.mark.parametrize("contact", [ALL, ONE, NONE, ~ONE], ids=["four", "one", "no", "three"])
+def test_a_robot_on_its_target_keeps_its_velocities(state_at, target_at, limbs, gains, contact):
+    state = state_at(moving=False)
+    tasks = prioritized_tasks(state, target_at(state, contact), limbs, gains)
+    vdot, v_ref = prioritized(state.M_inv, tasks)
+    np.testing.assert_allclose(vdot, 0.0, atol=ROUNDING)
+    np.testing.assert_allclose(v_ref, 0.0, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("contact", [ALL, ONE, NONE], ids=["four", "one", "no"])
+@pytest.mark.parametrize("seed", range(5))
+def test_reference_velocity_keeps_loaded_points_still_and_swings_the_others(
+    state_at, target_at, limbs, gains, contact, seed
+):
+    state = state_at(seed)
+    target = target_at(state, contact)
+    _, v_ref = prioritized(state.M_inv, prioritized_tasks(state, target, limbs, gains))
+    swinging = limbs.swinging(contact)
+    np.testing.assert_allclose(state.J_contacts[contact] @ v_ref, 0.0, atol=ROUNDING)
+    np.testing.assert_allclose(v_ref[JOINT_VELOCITY][swinging], target.joint_velocity[swinging], atol=ROUNDING)
+
+
+@pytest.mark.parametrize("knee", [0.0, 1e-6, 1e-3, 0.03, 0.1])
+def test_straight_legs_do_not_blow_up(robot, target_at, limbs, gains, knee):
+    q = robot.standing_configuration()
+    q[JOINT_POSITION] = np.tile([0.0, 0.0, knee], 4)
+    state = Kinematics(robot).at(q, np.zeros(robot.model.nv))
+    sunk = target_at(state, ALL, com=state.com - [0.0, 0.0, 0.1])
+    vdot, _ = prioritized(state.M_inv, prioritized_tasks(state, sunk, limbs, gains))
+    np.testing.assert_allclose(state.J_contacts @ vdot, 0.0, atol=ROUNDING)
+    assert np.abs(vdot).max() < ACCELERATION_MAX
