@@ -22,7 +22,11 @@ COST = 1e-3  # relative
 
 @pytest.fixture(
     scope="module",
-    params=[(jump(0.4, 0.0), Variant.AAKD_STAR), (MotionRequest(motion="spin"), Variant.AAKD), (jump(0.0, 0.2), Variant.KD)],
+    params=[
+        (jump(0.4, 0.0), Variant.AAKD_STAR),
+        (MotionRequest(motion="spin"), Variant.AAKD),
+        (jump(0.0, 0.2), Variant.KD),
+    ],
     ids=["forward jump AAKD*", "spin AAKD", "left jump KD"],
 )
 def both(request, robot):

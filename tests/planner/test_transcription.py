@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from aerial_planner.transcription import Problem, Rows, SolverOptions, StageData
+from aerial_planner.stage import Rows, StageData
+from aerial_planner.transcription import Problem, SolverOptions
 
 DT, N = 0.1, 60
 A = np.array([[1.0, DT], [0.0, 1.0]])
@@ -79,7 +80,7 @@ def test_stage_wise_derivatives_are_those_of_the_whole_problem():
     end.between("b", y[0] * y[1] * y[2], -1.0, 1.0)
     one = first.stage("one", x, u, p, ca.exp(x[1]) * u**2, ca.vertcat(x[0] * u, ca.cos(x[1]), p * u))
     two = end.stage("two", y, ca.SX(0, 1), ca.SX(0, 1), ca.sumsqr(y) ** 2, None)
-    functions = Problem([one, two], SolverOptions())._layout.functions("fatrop")
+    functions = Problem([one, two], SolverOptions()).functions()
 
     w, lam_g, lam_f = ca.MX.sym("w", 6), ca.MX.sym("l", 5), ca.MX.sym("lf")
     f, g = functions["nlp_f"](w, 0.7), functions["nlp_g"](w, 0.7)

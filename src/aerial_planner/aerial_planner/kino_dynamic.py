@@ -18,27 +18,25 @@ against them; because these knots are in the problem, the attitude at touchdown 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from enum import StrEnum
 
 import casadi as ca
 import numpy as np
 
 from aerial_model.contact import friction_pyramid
-from aerial_model.kinematics import Kinematics
-from aerial_model.robot import JOINT_VELOCITY, Robot
+from aerial_model.robot import Robot
+from aerial_planner.compiled import FunctionLibrary
+from aerial_planner.knots import FlightKnot, TakeOffKnot, foot_velocities, joint_inertia, world_feet
 from aerial_planner.reference import Reference
-from aerial_planner.schedule import GRAVITY, Schedule
+from aerial_planner.schedule import GRAVITY, Schedule, contact_bits
 from aerial_planner.settings import PlannerSettings
+from aerial_planner.stage import Rows, StageData, StageKind
 from aerial_planner.symbolic import (
     BaseFrameModel,
     attitude_error,
-    quaternion_product,
-    quaternion_step,
-    rotation_matrix,
 )
 from aerial_planner.trajectory import TakeOffTrajectory
-from aerial_planner.transcription import Problem, Rows, Solution, SolverOptions, StageData, StageKind
+from aerial_planner.transcription import Problem, Solution, SolverOptions
 
 
 class Variant(StrEnum):
@@ -59,12 +57,14 @@ class KinoDynamic:
         settings: PlannerSettings,
         variant: Variant,
         options: SolverOptions,
+        library: FunctionLibrary | None = None,
     ) -> None:
         self.robot = robot
         self.model = model
         self.settings = settings
         self.variant = variant
         self.options = options
+        self.library = library
         self._joint_inertia = joint_inertia(robot)
         self._problems: dict[bytes, Problem] = {}
         self._kinds: dict[tuple, StageKind] = {}
@@ -84,12 +84,16 @@ class KinoDynamic:
         """Return the problem of a schedule, built at its first use."""
         key = schedule.contact.tobytes() + bytes([schedule.flight_knots])
         if key not in self._problems:
-            kinds = [self._take_off_kind(*sets) for sets in _contact_sets(schedule)]
-            kinds.append(self._lift_off_kind(tuple(schedule.contact[-1])))
-            kinds += [self._flight_kind()] * (schedule.flight_knots - 1)
-            kinds.append(self._touchdown_kind())
-            self._problems[key] = Problem(kinds, self.options)
+            self._problems[key] = Problem(self.kinds(schedule), self.options, self.library)
         return self._problems[key]
+
+    def kinds(self, schedule: Schedule) -> list[StageKind]:
+        """Return the stage kind of each knot."""
+        sets = _contact_sets(schedule)
+        kinds = [self._take_off_kind(*pair) for pair in sets]
+        kinds.append(self._lift_off_kind(sets[-1][1]))
+        kinds += [self._flight_kind()] * (schedule.flight_knots - 1)
+        return [*kinds, self._touchdown_kind()]
 
     # --- stage kinds: variables, objective, dynamics, constraints ---------------------------------------------------
 
@@ -100,7 +104,7 @@ class KinoDynamic:
             return self._kinds[key]
         robot, settings = self.robot, self.settings
         n_c = robot.n_contacts
-        s = _TakeOffSymbols(robot, self.model, loaded)
+        s = TakeOffKnot(robot, self.model, loaded)
 
         dr = s.r - s.r_ref
         dv = s.rdot - s.rdot_ref
@@ -123,7 +127,7 @@ class KinoDynamic:
         if touching is None:
             rows.equal("start", s.x - s.x_0)
         else:
-            feet = _world_feet(self.model, s)
+            feet = world_feet(self.model, s)
             for i in range(n_c):
                 if touching[i]:
                     rows.equal("feet", feet[:, i] - s.foot_ref[:, i])  # (3.9a)
@@ -137,11 +141,18 @@ class KinoDynamic:
             self._actuator_rows(rows, s, loaded)
 
         following = s.step(self.model, robot.mass)
-        kind = rows.stage(f"take_off_{len(self._kinds)}", s.x, s.u, s.p, cost, following)
+        kind = rows.stage(
+            f"take_off_{contact_bits(touching)}_{contact_bits(loaded)}_{self.variant.name}",
+            s.x,
+            s.u,
+            s.p,
+            cost,
+            following,
+        )
         self._kinds[key] = kind
         return kind
 
-    def _actuator_rows(self, rows: Rows, s: _TakeOffSymbols, loaded: tuple[bool, ...]) -> None:
+    def _actuator_rows(self, rows: Rows, s: TakeOffKnot, loaded: tuple[bool, ...]) -> None:
         """Add torque and voltage limits (3.11b, c) of all joints, with τ of (3.14) plus the inertia of the joints."""
         robot, q_j = self.robot, s.q_j
         if self.variant is Variant.AAKD_STAR:
@@ -153,7 +164,7 @@ class KinoDynamic:
             torque -= J[3 * i : 3 * i + 3, :].T @ (s.R.T @ s.force[i])  # (3.14)
         self._limit_rows(rows, s, torque)
 
-    def _limit_rows(self, rows: Rows, s: _TakeOffSymbols, torque: ca.SX) -> None:
+    def _limit_rows(self, rows: Rows, s: TakeOffKnot, torque: ca.SX) -> None:
         """Add the limits of torque (3.11b) and of the voltage it needs at the joint rates (3.11c)."""
         law, share = self.robot.actuators, self.settings.margin
         for joint, name in enumerate(self.robot.joint_names):
@@ -167,19 +178,19 @@ class KinoDynamic:
         if key in self._kinds:
             return self._kinds[key]
         robot = self.robot
-        s = _TakeOffSymbols(robot, self.model, (False,) * robot.n_contacts, in_flight=True)
+        s = TakeOffKnot(robot, self.model, (False,) * robot.n_contacts, in_flight=True)
         rows = Rows()
-        feet = _world_feet(self.model, s)
+        feet = world_feet(self.model, s)
         for i in np.flatnonzero(touching):
             rows.equal("feet", feet[:, i] - s.foot_ref[:, i])
         landing = s.r + s.flight_time * s.rdot - ca.vertcat(0, 0, 0.5 * GRAVITY * s.flight_time**2)
         lead = s.landing_lead * ca.vertcat(s.rdot[:2], 0)
         rows.equal("landing position", landing + lead - s.landing_com)
-        flight = _FlightSymbols(robot, s.alpha, s.quaternion, s.q_j, s.omega, s.flight_p)
+        flight = FlightKnot(robot, s.alpha, s.quaternion, s.q_j, s.omega, s.flight_p)
         rows.equal("momentum", flight.momentum_gap(self.model))
         # The rates at which the feet leave the ground: without them the last force could be an impulse no leg follows.
         rows.equal("momentum", s.R.T @ s.alpha - self.model.angular_momentum(s.q_j, s.omega_ground, s.dq_j))
-        for i, slip in enumerate(_foot_velocities(self.model, s)):
+        for i, slip in enumerate(foot_velocities(self.model, s)):
             if touching[i]:
                 rows.equal("feet", slip)
         if self.variant is not Variant.KD:
@@ -190,7 +201,7 @@ class KinoDynamic:
             + w.joint_velocity * ca.sumsqr(s.dq_j)
             + w.joint_acceleration * ca.sumsqr(s.ddq_j)
         )
-        kind = rows.stage("lift_off", s.x, s.u, s.p, cost, flight.step())
+        kind = rows.stage(f"lift_off_{contact_bits(touching)}_{self.variant.name}", s.x, s.u, s.p, cost, flight.step())
         self._kinds[key] = kind
         return kind
 
@@ -199,8 +210,8 @@ class KinoDynamic:
         if key not in self._kinds:
             robot = self.robot
             alpha, quaternion, q_j = ca.SX.sym("alpha", 3), ca.SX.sym("quat", 4), ca.SX.sym("q_j", robot.n_joints)
-            omega, p = ca.SX.sym("omega", 3), ca.SX.sym("p", _FlightSymbols.n_p(robot))
-            flight = _FlightSymbols(robot, alpha, quaternion, q_j, omega, p)
+            omega, p = ca.SX.sym("omega", 3), ca.SX.sym("p", FlightKnot.n_p(robot))
+            flight = FlightKnot(robot, alpha, quaternion, q_j, omega, p)
             rows = Rows()
             rows.equal("momentum", flight.momentum_gap(self.model))
             self._kinds[key] = rows.stage(
@@ -302,125 +313,6 @@ class KinoDynamic:
             flight_joint_position=flight[:, 7:],
             flight_angular_velocity=np.array([u[:3] for u in solution.u[N : N + schedule.flight_knots]]),
         )
-
-
-def joint_inertia(robot: Robot) -> np.ndarray:
-    """Return the joints' block of the mass matrix ``(n, n)`` at the home pose, rotor inertia included [kg·m²]."""
-    q = robot.standing_configuration()
-    return Kinematics(robot).at(q, np.zeros(robot.model.nv)).M[JOINT_VELOCITY, JOINT_VELOCITY]
-
-
-class _TakeOffSymbols:
-    """Symbols of a take-off knot and its Euler step (3.5, 3.6)."""
-
-    def __init__(self, robot: Robot, model: BaseFrameModel, loaded: Sequence[bool], *, in_flight: bool = False) -> None:
-        n, n_c = robot.n_joints, robot.n_contacts
-        self._model = model
-        self.r, self.rdot, self.alpha = (ca.SX.sym(name, 3) for name in ("r", "rdot", "alpha"))
-        self.quaternion, self.q_j = ca.SX.sym("quat", 4), ca.SX.sym("q_j", n)
-        self.omega, self.dq_j = ca.SX.sym("omega", 3), ca.SX.sym("dq_j", n)
-        self.force = {int(i): ca.SX.sym(f"f_{i}", 3) for i in np.flatnonzero(loaded)}
-        self.f = ca.vertcat(*self.force.values())
-        self.dq_before = ca.SX.sym("dq_before", n)
-        self.x = ca.vertcat(self.r, self.rdot, self.alpha, self.quaternion, self.q_j, self.dq_before)
-        self.foot_ref = ca.SX.sym("foot_ref", 3, n_c)
-        if in_flight:
-            self.omega_ground = ca.SX.sym("omega_ground", 3)
-            self.dt = ca.SX.sym("dt")
-            self.ddq_j = (self.dq_j - self.dq_before) / self.dt
-            self.u = ca.vertcat(self.omega, self.omega_ground, self.dq_j)
-            self.flight_time, self.landing_lead = ca.SX.sym("T"), ca.SX.sym("lead")
-            self.landing_com = ca.SX.sym("landing_com", 3)
-            self.flight_p = ca.SX.sym("flight_p", _FlightSymbols.n_p(robot))
-            self.p = ca.vertcat(
-                self.dt, ca.vec(self.foot_ref), self.flight_time, self.landing_lead, self.landing_com, self.flight_p
-            )
-            return
-        self.u = ca.vertcat(self.omega, self.dq_j, self.f)
-        self.dt = ca.SX.sym("dt")
-        self.ddq_j = (self.dq_j - self.dq_before) / self.dt
-        self.r_ref, self.rdot_ref = ca.SX.sym("r_ref", 3), ca.SX.sym("rdot_ref", 3)
-        self.quaternion_ref, self.q_j_ref = ca.SX.sym("quat_ref", 4), ca.SX.sym("q_j_ref", n)
-        self.q_j_frozen = ca.SX.sym("q_j_frozen", n)
-        self.x_0 = ca.SX.sym("x_0", self.x.numel())
-        self.p = ca.vertcat(
-            self.dt,
-            self.r_ref,
-            self.rdot_ref,
-            self.quaternion_ref,
-            self.q_j_ref,
-            self.q_j_frozen,
-            ca.vec(self.foot_ref),
-            self.x_0,
-        )
-
-    @property
-    def R(self) -> ca.SX:  # noqa: N802
-        return rotation_matrix(self.quaternion)
-
-    def step(self, model: BaseFrameModel, mass: float) -> ca.SX:
-        """Return the next state: (3.5) and (3.6)."""
-        feet = _world_feet(model, self)
-        rddot = -ca.vertcat(0, 0, GRAVITY)
-        alpha_dot = ca.SX.zeros(3)
-        for i, f in self.force.items():
-            rddot += f / mass
-            alpha_dot += ca.cross(feet[:, i] - self.r, f)
-        rdot_next = self.rdot + rddot * self.dt
-        return ca.vertcat(
-            self.r + 0.5 * (self.rdot + rdot_next) * self.dt,
-            rdot_next,
-            self.alpha + alpha_dot * self.dt,
-            quaternion_product(self.quaternion, quaternion_step(self.omega, self.dt)),
-            self.q_j + self.dq_j * self.dt,
-            self.dq_j,
-        )
-
-
-class _FlightSymbols:
-    """A flight interval: α constant, legs on their path, the body turning so that (3.8) holds at mid-interval."""
-
-    def __init__(self, robot: Robot, alpha: ca.SX, quaternion: ca.SX, q_j: ca.SX, omega: ca.SX, p: ca.SX) -> None:
-        self.alpha, self.quaternion, self.q_j, self.omega = alpha, quaternion, q_j, omega
-        self.dt, self.fraction, self.target = p[0], p[1], p[2:]
-        self.step_j = self.fraction * (self.target - q_j)
-
-    @staticmethod
-    def n_p(robot: Robot) -> int:
-        """Number of parameters: dt, fraction of the way to the target pose, the target pose."""
-        return 2 + robot.n_joints
-
-    def momentum_gap(self, model: BaseFrameModel) -> ca.SX:
-        """Return Rᵀα − α_B at mid-interval (3.8)."""
-        R_mid = rotation_matrix(quaternion_product(self.quaternion, quaternion_step(self.omega, 0.5 * self.dt)))
-        return R_mid.T @ self.alpha - model.angular_momentum(
-            self.q_j + 0.5 * self.step_j, self.omega, self.step_j / self.dt
-        )
-
-    def step(self) -> ca.SX:
-        """Return α, attitude and joint angles at the end of the interval."""
-        return ca.vertcat(
-            self.alpha,
-            quaternion_product(self.quaternion, quaternion_step(self.omega, self.dt)),
-            self.q_j + self.step_j,
-        )
-
-
-def _world_feet(model: BaseFrameModel, s: _TakeOffSymbols) -> ca.SX:
-    """Return c_i ``(3, n_c)`` [m] in S from the centre of mass and the attitude (3.7)."""
-    relative = model.feet(s.q_j) - ca.repmat(model.com(s.q_j), 1, s.foot_ref.shape[1])
-    return ca.repmat(s.r, 1, s.foot_ref.shape[1]) + s.R @ relative
-
-
-def _foot_velocities(model: BaseFrameModel, s: _TakeOffSymbols) -> list[ca.SX]:
-    """Return each ċ_i ``(3,)`` in B [m/s] at the rates of the ground."""
-    feet, com, J = model.feet(s.q_j), model.com(s.q_j), model.foot_jacobians(s.q_j)
-    J_com = ca.jacobian(com, s.q_j)
-    rates = []
-    for i in range(s.foot_ref.shape[1]):
-        relative = feet[:, i] - com
-        rates.append(s.R.T @ s.rdot + ca.cross(s.omega_ground, relative) + (J[3 * i : 3 * i + 3, :] - J_com) @ s.dq_j)
-    return rates
 
 
 def _contact_sets(schedule: Schedule) -> list[tuple[tuple[bool, ...] | None, tuple[bool, ...]]]:

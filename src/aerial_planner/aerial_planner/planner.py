@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, Robot
 from aerial_model.state import Estimate
 from aerial_planner.assembly import ActuatorUse, actuator_use, assemble
 from aerial_planner.checks import check, clearance_deficit
+from aerial_planner.compiled import FunctionLibrary
 from aerial_planner.inverse_kinematics import InverseKinematics
 from aerial_planner.kino_dynamic import KinoDynamic, Variant
 from aerial_planner.reference import Reference, body_reference
@@ -24,6 +26,7 @@ from aerial_planner.schedule import Motion, Schedule, contact_schedule, load_mot
 from aerial_planner.screen import screen
 from aerial_planner.settings import PlannerSettings
 from aerial_planner.srbm import SingleRigidBody
+from aerial_planner.stage import StageKind
 from aerial_planner.symbolic import base_frame_model
 from aerial_planner.trajectory import TakeOffTrajectory
 from aerial_planner.transcription import Solution, SolverOptions
@@ -84,15 +87,30 @@ class _Clock:
 
 
 class Planner:
-    """Plans motions of one robot; problems are built once per contact schedule and reused."""
+    """Plans motions of one robot; problems are built once per contact schedule and reused.
 
-    def __init__(self, robot: Robot, *, solver: str = "fatrop", settings: PlannerSettings | None = None) -> None:
+    Args:
+        robot: that moves.
+        solver: ``"fatrop"`` or ``"ipopt"``.
+        settings: None: the robot's.
+        cache: folder of compiled functions (see ``compiled``); None: evaluate interpreted ones.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        *,
+        solver: str = "fatrop",
+        settings: PlannerSettings | None = None,
+        cache: Path | None = None,
+    ) -> None:
         self.robot = robot
         self.settings = settings or robot.section("planner", PlannerSettings)
+        self._library = FunctionLibrary(cache, robot, self.settings) if cache else None
         self.options = SolverOptions(solver=solver, max_iterations=_ITERATIONS_MAX)
         self._model = base_frame_model(robot)
         self._ik = InverseKinematics(robot, self._model)
-        self._srbm = SingleRigidBody(robot, self._model, self._ik, self.settings, self.options)
+        self._srbm = SingleRigidBody(robot, self._model, self._ik, self.settings, self.options, self._library)
         self._kino_dynamic: dict[Variant, KinoDynamic] = {}
 
     def plan(
@@ -120,6 +138,31 @@ class Planner:
         schedule = self._schedule(request, load_motion(request.motion), 0.0)
         self._srbm.problem(schedule)
         self._stage(self._variant(request)).problem(schedule)
+
+    def compile(self, requests: Iterable[MotionRequest], progress: Callable[[str], None]) -> int:
+        """Compile what plans of these requests evaluate, unless it is there; return how many stage kinds that were.
+
+        Args:
+            requests: one of each contact schedule and variant.
+            progress: told the name of each kind before it is compiled.
+
+        Raises:
+            CompilationError: if there is no C compiler, or it fails.
+            ValueError: if the planner has no cache.
+        """
+        if self._library is None:
+            raise ValueError("a planner without a cache has nowhere to compile to")
+        kinds: dict[str, StageKind] = {}
+        for request in requests:
+            schedule = self._schedule(request, load_motion(request.motion), 0.0)
+            for stage in (self._srbm, self._stage(self._variant(request))):
+                kinds.update((kind.name, kind) for kind in stage.kinds(schedule))
+        compiled = 0
+        for name, kind in kinds.items():
+            if self._library.load(name) is None:
+                progress(name)
+                compiled += self._library.compile(kind)
+        return compiled
 
     def _plan(
         self, request: MotionRequest, start: Estimate | None, progress: Progress, clock: _Clock
@@ -191,7 +234,9 @@ class Planner:
 
     def _stage(self, variant: Variant) -> KinoDynamic:
         if variant not in self._kino_dynamic:
-            self._kino_dynamic[variant] = KinoDynamic(self.robot, self._model, self.settings, variant, self.options)
+            self._kino_dynamic[variant] = KinoDynamic(
+                self.robot, self._model, self.settings, variant, self.options, self._library
+            )
         return self._kino_dynamic[variant]
 
     def _variant(self, request: MotionRequest) -> Variant:

@@ -140,6 +140,11 @@ def contact_schedule(
     )
 
 
+def contact_bits(contacts: tuple[bool, ...] | None) -> str:
+    """Return a contact set as part of a name; None is the knot at which the motion starts."""
+    return "start" if contacts is None else "".join("01"[on] for on in contacts)
+
+
 def _check_goal(request: MotionRequest, motion: Motion) -> None:
     asked = {
         "displacement": bool(np.any(request.displacement)),

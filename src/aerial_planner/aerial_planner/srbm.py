@@ -15,10 +15,12 @@ import numpy as np
 from aerial_model import rotation
 from aerial_model.contact import friction_pyramid
 from aerial_model.robot import Robot
+from aerial_planner.compiled import FunctionLibrary
 from aerial_planner.inverse_kinematics import InverseKinematics
 from aerial_planner.reference import Reference
-from aerial_planner.schedule import GRAVITY, Schedule
+from aerial_planner.schedule import GRAVITY, Schedule, contact_bits
 from aerial_planner.settings import PlannerSettings
+from aerial_planner.stage import Rows, StageData, StageKind
 from aerial_planner.symbolic import (
     BaseFrameModel,
     attitude_error,
@@ -27,7 +29,7 @@ from aerial_planner.symbolic import (
     rotation_matrix,
 )
 from aerial_planner.trajectory import TakeOffTrajectory
-from aerial_planner.transcription import Problem, Rows, Solution, SolverOptions, StageData, StageKind
+from aerial_planner.transcription import Problem, Solution, SolverOptions
 
 _REACH_SAMPLES = 2000  # random poses from which the longest leg is read
 
@@ -42,12 +44,14 @@ class SingleRigidBody:
         ik: InverseKinematics,
         settings: PlannerSettings,
         options: SolverOptions,
+        library: FunctionLibrary | None = None,
     ) -> None:
         self.robot = robot
         self.model = model
         self.ik = ik
         self.settings = settings
         self.options = options
+        self.library = library
         home = robot.poses["home"]
         self.inertia = np.asarray(model.inertia(home))  # (3, 3) about the centre of mass, in B [kg·m²]
         self.inertia_inverse = np.linalg.inv(self.inertia)
@@ -84,13 +88,16 @@ class SingleRigidBody:
         """Return the problem of a schedule, built at its first use."""
         key = schedule.contact.tobytes() + bytes([schedule.flight_knots])
         if key not in self._problems:
-            rows = [tuple(bool(b) for b in row) for row in schedule.contact]
-            kinds = [self._take_off_kind(row, first=k == 0) for k, row in enumerate(rows)]
-            kinds.append(self._lift_off_kind(rows[-1]))
-            kinds += [self._flight_kind()] * (schedule.flight_knots - 1)
-            kinds.append(self._touchdown_kind())
-            self._problems[key] = Problem(kinds, self.options)
+            self._problems[key] = Problem(self.kinds(schedule), self.options, self.library)
         return self._problems[key]
+
+    def kinds(self, schedule: Schedule) -> list[StageKind]:
+        """Return the stage kind of each knot."""
+        rows = [tuple(bool(b) for b in row) for row in schedule.contact]
+        kinds = [self._take_off_kind(row, first=k == 0) for k, row in enumerate(rows)]
+        kinds.append(self._lift_off_kind(rows[-1]))
+        kinds += [self._flight_kind()] * (schedule.flight_knots - 1)
+        return [*kinds, self._touchdown_kind()]
 
     def _take_off_kind(self, loaded: tuple[bool, ...], *, first: bool) -> StageKind:
         key = ("take_off", loaded, first)
@@ -132,7 +139,9 @@ class SingleRigidBody:
         for f in force.values():
             rows.between("friction", ca.DM(pyramid) @ f, 0.0, np.inf)
         p = ca.vertcat(dt, r_ref, rdot_ref, quaternion_ref, ca.vec(s.foot_ref), x_0)
-        self._kinds[key] = rows.stage(f"body_{len(self._kinds)}", s.x, u, p, cost, following)
+        self._kinds[key] = rows.stage(
+            f"body_{'start_' if first else ''}{contact_bits(loaded)}", s.x, u, p, cost, following
+        )
         return self._kinds[key]
 
     def _reach_rows(self, rows: Rows, s: _BodySymbols, held: tuple[bool, ...]) -> None:
@@ -152,7 +161,9 @@ class SingleRigidBody:
             rows.equal("landing position", s.landing_gap(T, lead, landing_com))
             p = ca.vertcat(dt, T, lead, landing_com, ca.vec(s.foot_ref))
             following = _flight_step(s.alpha, s.quaternion, dt, self.inertia_inverse)
-            self._kinds[key] = rows.stage("body_lift_off", s.x, ca.SX(0, 1), p, ca.SX(0), following)
+            self._kinds[key] = rows.stage(
+                f"body_lift_off_{contact_bits(held)}", s.x, ca.SX(0, 1), p, ca.SX(0), following
+            )
         return self._kinds[key]
 
     def _flight_kind(self) -> StageKind:

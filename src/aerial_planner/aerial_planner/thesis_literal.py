@@ -16,7 +16,8 @@ import numpy as np
 
 from aerial_model import rotation
 from aerial_model.robot import Robot
-from aerial_planner.kino_dynamic import Variant, joint_inertia
+from aerial_planner.kino_dynamic import Variant
+from aerial_planner.knots import joint_inertia
 from aerial_planner.reference import Reference
 from aerial_planner.schedule import GRAVITY, Schedule
 from aerial_planner.settings import PlannerSettings
@@ -221,7 +222,13 @@ class LiteralProblem:
     def solve(self, guess: TakeOffTrajectory, *, tolerance: float = 1e-4, max_iterations: int = 500) -> LiteralSolution:
         """Return the optimum near ``guess``."""
         self._set_initial(guess)
-        options = {"print_level": 0, "sb": "yes", "tol": tolerance, "max_iter": max_iterations, "linear_solver": "mumps"}
+        options = {
+            "print_level": 0,
+            "sb": "yes",
+            "tol": tolerance,
+            "max_iter": max_iterations,
+            "linear_solver": "mumps",
+        }
         began = time.perf_counter()
         self.opti.solver("ipopt", {"print_time": False, "record_time": True, "error_on_fail": False}, options)
         solution = self.opti.solve_limited()  # makes IPOPT's derivatives first

@@ -12,160 +12,17 @@ same sequence: all numbers enter as stage parameters and bounds.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import casadi as ca
 import numpy as np
 
-from aerial_planner.symbolic import conjugate, quaternion_product
+from aerial_planner.compiled import FunctionLibrary
+from aerial_planner.stage import StageData, StageFunctions, StageKind
 
+_NLP_GRAD_OUTPUTS = ["f", "g", "grad_gamma_x", "grad_gamma_p"]
 _ACTIVE = 1e-3  # an inequality nearer to its bound than this holds the optimum back
-_SAME_TURN = 0.5  # least q_goal · q of an attitude that is the goal's
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class StageKind:
-    """The expressions of one kind of knot; ``next_state`` is None at the last one.
-
-    Constraint bounds that are numbers of the problem rather than of the request are given here.
-    """
-
-    name: str
-    x: ca.SX  # (n_x,)
-    u: ca.SX  # (n_u,), possibly empty
-    p: ca.SX  # (n_p,) stage parameters
-    cost: ca.SX  # scalar
-    next_state: ca.SX | None
-    constraints: ca.SX  # (n_g,)
-    lower: np.ndarray  # (n_g,); equal to upper: an equality
-    upper: np.ndarray  # (n_g,)
-    labels: tuple[str, ...]  # what each constraint is, for people
-
-    @property
-    def n_next(self) -> int:
-        """Number of states of the next knot."""
-        return 0 if self.next_state is None else self.next_state.numel()
-
-    @cached_property
-    def _dynamics(self) -> ca.SX:
-        return ca.SX(0, 1) if self.next_state is None else self.next_state
-
-    @property
-    def z(self) -> ca.SX:
-        """States and controls ``(n_x + n_u,)``."""
-        return ca.vertcat(self.x, self.u)
-
-    @cached_property
-    def values(self) -> ca.Function:
-        """(z, p) ↦ cost, next state, constraints."""
-        return ca.Function(
-            self.name, [self.z, self.p], [self.cost, self._dynamics, ca.densify(self.constraints)], {"cse": True}
-        )
-
-    @cached_property
-    def gradient(self) -> ca.Function:
-        """(z, p) ↦ gradient of the cost."""
-        return ca.Function(
-            self.name + "_grad", [self.z, self.p], [ca.densify(ca.gradient(self.cost, self.z))], {"cse": True}
-        )
-
-    @cached_property
-    def jacobian(self) -> ca.Function:
-        """(z, p) ↦ Jacobians of −next state and of the constraints with respect to z."""
-        J = [ca.jacobian(-self._dynamics, self.z), ca.jacobian(self.constraints, self.z)]
-        return ca.Function(self.name + "_jac", [self.z, self.p], J, {"cse": True})
-
-    @cached_property
-    def hessian(self) -> ca.Function:
-        """(z, p, λ_f, λ_dynamics, λ_constraints) ↦ gradient and Hessian of the Lagrangian with respect to z."""
-        lam_f = ca.SX.sym("lam_f")
-        lam_x = ca.SX.sym("lam_x", self.n_next)
-        lam_g = ca.SX.sym("lam_g", self.constraints.numel())
-        lagrangian = lam_f * self.cost - ca.dot(lam_x, self._dynamics) + ca.dot(lam_g, self.constraints)
-        H, g = ca.hessian(lagrangian, self.z)
-        return ca.Function(
-            self.name + "_hess", [self.z, self.p, lam_f, lam_x, lam_g], [ca.densify(g), H], {"cse": True}
-        )
-
-
-class Rows:
-    """Constraint rows with their bounds, collected in the order the formulation states them."""
-
-    def __init__(self) -> None:
-        self._expressions: list[ca.SX] = []
-        self._lower: list[float] = []
-        self._upper: list[float] = []
-        self._labels: list[str] = []
-
-    def equal(self, label: str, expression: ca.SX) -> None:
-        """Add expression = 0."""
-        self.between(label, expression, 0.0, 0.0)
-
-    def between(self, label: str, expression: ca.SX, lower: float, upper: float) -> None:
-        """Add lower ≤ expression ≤ upper."""
-        self._expressions.append(expression)
-        self._labels += [label] * expression.numel()
-        self._lower += [lower] * expression.numel()
-        self._upper += [upper] * expression.numel()
-
-    def attitude(self, quaternion: ca.SX, goal: ca.SX) -> None:
-        """Add quaternion = goal, and not its negative: the attitude itself, not the one a full turn away."""
-        error = quaternion_product(conjugate(goal), quaternion)
-        self.equal("landing attitude", error[:3])
-        self.between("landing attitude", error[3], _SAME_TURN, np.inf)
-
-    def stage(self, name: str, x: ca.SX, u: ca.SX, p: ca.SX, cost: ca.SX, next_state: ca.SX | None) -> StageKind:
-        """Return the stage kind with these rows as its constraints."""
-        return StageKind(
-            name=name,
-            x=x,
-            u=u,
-            p=p,
-            cost=cost,
-            next_state=next_state,
-            constraints=ca.vertcat(ca.SX(0, 1), *self._expressions),
-            lower=np.array(self._lower),
-            upper=np.array(self._upper),
-            labels=tuple(self._labels),
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
-class StageData:
-    """The numbers of one knot of one request."""
-
-    p: np.ndarray  # (n_p,)
-    x_min: np.ndarray  # (n_x,)
-    x_max: np.ndarray
-    u_min: np.ndarray  # (n_u,)
-    u_max: np.ndarray
-    x: np.ndarray  # guess (n_x,)
-    u: np.ndarray  # guess (n_u,)
-
-    @staticmethod
-    def free(
-        *,
-        p: np.ndarray,
-        x: np.ndarray,
-        u: np.ndarray | None = None,
-        x_min: np.ndarray | None = None,
-        x_max: np.ndarray | None = None,
-        u_min: np.ndarray | None = None,
-        u_max: np.ndarray | None = None,
-    ) -> StageData:
-        """Return a knot's data with infinite bounds where none are given, and no control where none is."""
-        u = np.zeros(0) if u is None else u
-        return StageData(
-            p=p,
-            x=x,
-            u=u,
-            x_min=np.full(len(x), -np.inf) if x_min is None else x_min,
-            x_max=np.full(len(x), np.inf) if x_max is None else x_max,
-            u_min=np.full(len(u), -np.inf) if u_min is None else u_min,
-            u_max=np.full(len(u), np.inf) if u_max is None else u_max,
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,10 +52,16 @@ class SolverOptions:
 class Problem:
     """A sequence of stage kinds, built once and solved for many requests."""
 
-    def __init__(self, kinds: Sequence[StageKind], options: SolverOptions = SolverOptions()) -> None:
+    def __init__(
+        self,
+        kinds: Sequence[StageKind],
+        options: SolverOptions = SolverOptions(),
+        library: FunctionLibrary | None = None,
+    ) -> None:
         self.kinds = list(kinds)
         self.options = options
         self._layout = _Layout(self.kinds)
+        self._library = library
         self._solver = self._build()
 
     def solve(self, stages: Sequence[StageData]) -> Solution:
@@ -229,12 +92,20 @@ class Problem:
         g = np.asarray(self._solver.get_function("nlp_g")(w, p)).ravel()
         return _excess(w, lower_w, upper_w, g, self._layout.lower, self._layout.upper)
 
+    def functions(self) -> dict[str, ca.Function]:
+        """Return the problem's functions and derivatives, under the names CasADi's interface to the solver looks for."""
+        return self._layout.functions(self.options.solver, self._functions_of)
+
+    def _functions_of(self, kind: StageKind) -> StageFunctions:
+        compiled = self._library.load(kind.name) if self._library else None
+        return compiled or kind.functions()
+
     def _build(self) -> ca.Function:
         layout = self._layout
-        functions = layout.functions(self.options.solver)
+        functions = self.functions()
         w, p = layout.w, layout.p
         nlp = {"x": w, "p": p, "f": functions["nlp_f"](w, p), "g": functions["nlp_g"](w, p)}
-        common = {"print_time": False, "cache": functions, "error_on_fail": False}
+        common = {"print_time": False, "cache": functions, "error_on_fail": False, "calc_lam_p": False}
         options = self.options
         if options.solver == "fatrop":
             settings = {
@@ -326,7 +197,7 @@ class _Layout:
             found.setdefault(id(kind), (kind, []))[1].append(k)
         return list(found.values())
 
-    def functions(self, solver: str) -> dict[str, ca.Function]:
+    def functions(self, solver: str, functions_of: Callable[[StageKind], StageFunctions]) -> dict[str, ca.Function]:
         """Return the problem's functions with the names and outputs that CasADi's interface to ``solver`` looks for."""
         w, p = self.w, self.p
         n_w, n_g = w.numel(), len(self.lower)
@@ -334,23 +205,23 @@ class _Layout:
         cost = ca.MX(0)
         g, gradient, jacobian, lagrangian_gradient, hessian = ([] for _ in range(5))  # lists of _Blocks
         for kind, knots in self.groups():
-            n = len(knots)
+            n, stage = len(knots), functions_of(kind)
             z_0, row_0 = self.z_0[knots], self.row_0[knots]
             row_g = row_0 + kind.n_next
             z, parameters = _gather(w, z_0, kind.z.numel()), _gather(p, self.p_0[knots], kind.p.numel())
             lam = (_gather(lam_g, row_0, kind.n_next), _gather(lam_g, row_g, kind.constraints.numel()))
-            f, following, values = kind.values.map(n)(z, parameters)
-            J_x, J_g = kind.jacobian.map(n)(z, parameters)
-            lag, H = kind.hessian.map(n)(z, parameters, ca.repmat(lam_f, 1, n), *lam)
+            f, following, values = stage.values.map(n)(z, parameters)
+            J_x, J_g = stage.jacobian.map(n)(z, parameters)
+            lag, H = stage.hessian.map(n)(z, parameters, ca.repmat(lam_f, 1, n), *lam)
             column = np.zeros(n, dtype=int)
             cost += ca.sum2(f)
-            g += [_Blocks(kind.values.sparsity_out(1), -following, row_0, column)]
-            g += [_Blocks(kind.values.sparsity_out(2), values, row_g, column)]
-            gradient += [_Blocks(kind.gradient.sparsity_out(0), kind.gradient.map(n)(z, parameters), z_0, column)]
-            jacobian += [_Blocks(kind.jacobian.sparsity_out(0), J_x, row_0, z_0)]
-            jacobian += [_Blocks(kind.jacobian.sparsity_out(1), J_g, row_g, z_0)]
-            lagrangian_gradient += [_Blocks(kind.hessian.sparsity_out(0), lag, z_0, column)]
-            hessian += [_Blocks(kind.hessian.sparsity_out(1), H, z_0, z_0)]
+            g += [_Blocks(stage.values.sparsity_out(1), -following, row_0, column)]
+            g += [_Blocks(stage.values.sparsity_out(2), values, row_g, column)]
+            gradient += [_Blocks(stage.gradient.sparsity_out(0), stage.gradient.map(n)(z, parameters), z_0, column)]
+            jacobian += [_Blocks(stage.jacobian.sparsity_out(0), J_x, row_0, z_0)]
+            jacobian += [_Blocks(stage.jacobian.sparsity_out(1), J_g, row_g, z_0)]
+            lagrangian_gradient += [_Blocks(stage.hessian.sparsity_out(0), lag, z_0, column)]
+            hessian += [_Blocks(stage.hessian.sparsity_out(1), H, z_0, z_0)]
         for k, kind in enumerate(self.kinds[:-1]):  # the next knot's state, with coefficient 1
             x_next = w[int(self.z_0[k + 1]) : int(self.z_0[k + 1]) + kind.n_next]
             at_row, at_column = self.row_0[k : k + 1], self.z_0[k + 1 : k + 2]
@@ -367,8 +238,10 @@ class _Layout:
             "nlp_jac_g": ([w, p], [g_all, _assembled(jacobian, n_g, n_w)], ["g", "jac_g_x"]),
         }
         multipliers = [w, p, lam_f, lam_g]
+        grad_lagrangian = _assembled(lagrangian_gradient, n_w, 1)
+        # CasADi wants this one at hand for multipliers of parameters; they are not asked for (calc_lam_p).
+        outputs["nlp_grad"] = (multipliers, [cost, g_all, grad_lagrangian, ca.MX(p.numel(), 1)], _NLP_GRAD_OUTPUTS)
         if solver == "fatrop":
-            grad_lagrangian = _assembled(lagrangian_gradient, n_w, 1)
             outputs["nlp_grad_f"] = ([w, p], [grad_f], ["grad_f_x"])
             outputs["nlp_hess_l"] = (multipliers, [grad_lagrangian, H_all], ["grad_gamma_x", "hess_gamma_x_x"])
         else:

@@ -1,0 +1,132 @@
+"""Symbols of the kino-dynamic knots, their Euler steps and the kinematics they share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+
+from aerial_model.kinematics import Kinematics
+from aerial_model.robot import JOINT_VELOCITY, Robot
+from aerial_planner.schedule import GRAVITY
+from aerial_planner.symbolic import BaseFrameModel, quaternion_product, quaternion_step, rotation_matrix
+
+
+def joint_inertia(robot: Robot) -> np.ndarray:
+    """Return the joints' block of the mass matrix ``(n, n)`` at the home pose, rotor inertia included [kg·m²]."""
+    q = robot.standing_configuration()
+    return Kinematics(robot).at(q, np.zeros(robot.model.nv)).M[JOINT_VELOCITY, JOINT_VELOCITY]
+
+
+class TakeOffKnot:
+    """Symbols of a take-off knot and its Euler step (3.5, 3.6)."""
+
+    def __init__(self, robot: Robot, model: BaseFrameModel, loaded: Sequence[bool], *, in_flight: bool = False) -> None:
+        n, n_c = robot.n_joints, robot.n_contacts
+        self._model = model
+        self.r, self.rdot, self.alpha = (ca.SX.sym(name, 3) for name in ("r", "rdot", "alpha"))
+        self.quaternion, self.q_j = ca.SX.sym("quat", 4), ca.SX.sym("q_j", n)
+        self.omega, self.dq_j = ca.SX.sym("omega", 3), ca.SX.sym("dq_j", n)
+        self.force = {int(i): ca.SX.sym(f"f_{i}", 3) for i in np.flatnonzero(loaded)}
+        self.f = ca.vertcat(*self.force.values())
+        self.dq_before = ca.SX.sym("dq_before", n)
+        self.x = ca.vertcat(self.r, self.rdot, self.alpha, self.quaternion, self.q_j, self.dq_before)
+        self.foot_ref = ca.SX.sym("foot_ref", 3, n_c)
+        if in_flight:
+            self.omega_ground = ca.SX.sym("omega_ground", 3)
+            self.dt = ca.SX.sym("dt")
+            self.ddq_j = (self.dq_j - self.dq_before) / self.dt
+            self.u = ca.vertcat(self.omega, self.omega_ground, self.dq_j)
+            self.flight_time, self.landing_lead = ca.SX.sym("T"), ca.SX.sym("lead")
+            self.landing_com = ca.SX.sym("landing_com", 3)
+            self.flight_p = ca.SX.sym("flight_p", FlightKnot.n_p(robot))
+            self.p = ca.vertcat(
+                self.dt, ca.vec(self.foot_ref), self.flight_time, self.landing_lead, self.landing_com, self.flight_p
+            )
+            return
+        self.u = ca.vertcat(self.omega, self.dq_j, self.f)
+        self.dt = ca.SX.sym("dt")
+        self.ddq_j = (self.dq_j - self.dq_before) / self.dt
+        self.r_ref, self.rdot_ref = ca.SX.sym("r_ref", 3), ca.SX.sym("rdot_ref", 3)
+        self.quaternion_ref, self.q_j_ref = ca.SX.sym("quat_ref", 4), ca.SX.sym("q_j_ref", n)
+        self.q_j_frozen = ca.SX.sym("q_j_frozen", n)
+        self.x_0 = ca.SX.sym("x_0", self.x.numel())
+        self.p = ca.vertcat(
+            self.dt,
+            self.r_ref,
+            self.rdot_ref,
+            self.quaternion_ref,
+            self.q_j_ref,
+            self.q_j_frozen,
+            ca.vec(self.foot_ref),
+            self.x_0,
+        )
+
+    @property
+    def R(self) -> ca.SX:  # noqa: N802
+        return rotation_matrix(self.quaternion)
+
+    def step(self, model: BaseFrameModel, mass: float) -> ca.SX:
+        """Return the next state: (3.5) and (3.6)."""
+        feet = world_feet(model, self)
+        rddot = -ca.vertcat(0, 0, GRAVITY)
+        alpha_dot = ca.SX.zeros(3)
+        for i, f in self.force.items():
+            rddot += f / mass
+            alpha_dot += ca.cross(feet[:, i] - self.r, f)
+        rdot_next = self.rdot + rddot * self.dt
+        return ca.vertcat(
+            self.r + 0.5 * (self.rdot + rdot_next) * self.dt,
+            rdot_next,
+            self.alpha + alpha_dot * self.dt,
+            quaternion_product(self.quaternion, quaternion_step(self.omega, self.dt)),
+            self.q_j + self.dq_j * self.dt,
+            self.dq_j,
+        )
+
+
+class FlightKnot:
+    """A flight interval: α constant, legs on their path, the body turning so that (3.8) holds at mid-interval."""
+
+    def __init__(self, robot: Robot, alpha: ca.SX, quaternion: ca.SX, q_j: ca.SX, omega: ca.SX, p: ca.SX) -> None:
+        self.alpha, self.quaternion, self.q_j, self.omega = alpha, quaternion, q_j, omega
+        self.dt, self.fraction, self.target = p[0], p[1], p[2:]
+        self.step_j = self.fraction * (self.target - q_j)
+
+    @staticmethod
+    def n_p(robot: Robot) -> int:
+        """Number of parameters: dt, fraction of the way to the target pose, the target pose."""
+        return 2 + robot.n_joints
+
+    def momentum_gap(self, model: BaseFrameModel) -> ca.SX:
+        """Return Rᵀα − α_B at mid-interval (3.8)."""
+        R_mid = rotation_matrix(quaternion_product(self.quaternion, quaternion_step(self.omega, 0.5 * self.dt)))
+        return R_mid.T @ self.alpha - model.angular_momentum(
+            self.q_j + 0.5 * self.step_j, self.omega, self.step_j / self.dt
+        )
+
+    def step(self) -> ca.SX:
+        """Return α, attitude and joint angles at the end of the interval."""
+        return ca.vertcat(
+            self.alpha,
+            quaternion_product(self.quaternion, quaternion_step(self.omega, self.dt)),
+            self.q_j + self.step_j,
+        )
+
+
+def world_feet(model: BaseFrameModel, s: TakeOffKnot) -> ca.SX:
+    """Return c_i ``(3, n_c)`` [m] in S from the centre of mass and the attitude (3.7)."""
+    relative = model.feet(s.q_j) - ca.repmat(model.com(s.q_j), 1, s.foot_ref.shape[1])
+    return ca.repmat(s.r, 1, s.foot_ref.shape[1]) + s.R @ relative
+
+
+def foot_velocities(model: BaseFrameModel, s: TakeOffKnot) -> list[ca.SX]:
+    """Return each ċ_i ``(3,)`` in B [m/s] at the rates of the ground."""
+    feet, com, J = model.feet(s.q_j), model.com(s.q_j), model.foot_jacobians(s.q_j)
+    J_com = ca.jacobian(com, s.q_j)
+    rates = []
+    for i in range(s.foot_ref.shape[1]):
+        relative = feet[:, i] - com
+        rates.append(s.R.T @ s.rdot + ca.cross(s.omega_ground, relative) + (J[3 * i : 3 * i + 3, :] - J_com) @ s.dq_j)
+    return rates

@@ -1,0 +1,154 @@
+"""One knot of an optimal control problem, as expressions: next state, cost, constraints; and its numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from aerial_planner.symbolic import conjugate, quaternion_product
+
+_SAME_TURN = 0.5  # least q_goal · q of an attitude that is the goal's
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StageKind:
+    """The expressions of one kind of knot; ``next_state`` is None at the last one.
+
+    Constraint bounds that are numbers of the problem rather than of the request are given here.
+    """
+
+    name: str
+    x: ca.SX  # (n_x,)
+    u: ca.SX  # (n_u,), possibly empty
+    p: ca.SX  # (n_p,) stage parameters
+    cost: ca.SX  # scalar
+    next_state: ca.SX | None
+    constraints: ca.SX  # (n_g,)
+    lower: np.ndarray  # (n_g,); equal to upper: an equality
+    upper: np.ndarray  # (n_g,)
+    labels: tuple[str, ...]  # what each constraint is, for people
+
+    @property
+    def n_next(self) -> int:
+        """Number of states of the next knot."""
+        return 0 if self.next_state is None else self.next_state.numel()
+
+    @property
+    def _dynamics(self) -> ca.SX:
+        return ca.SX(0, 1) if self.next_state is None else self.next_state
+
+    @property
+    def z(self) -> ca.SX:
+        """States and controls ``(n_x + n_u,)``."""
+        return ca.vertcat(self.x, self.u)
+
+    def functions(self) -> StageFunctions:
+        """Return the kind's functions and derivatives; making them is what takes time in building a problem."""
+        z, p = self.z, self.p
+        lam_f = ca.SX.sym("lam_f")
+        lam_x = ca.SX.sym("lam_x", self.n_next)
+        lam_g = ca.SX.sym("lam_g", self.constraints.numel())
+        lagrangian = lam_f * self.cost - ca.dot(lam_x, self._dynamics) + ca.dot(lam_g, self.constraints)
+        H, gradient = ca.hessian(lagrangian, z)
+        expressions = {
+            "values": ([z, p], [self.cost, self._dynamics, ca.densify(self.constraints)]),
+            "gradient": ([z, p], [ca.densify(ca.gradient(self.cost, z))]),
+            "jacobian": ([z, p], [ca.jacobian(-self._dynamics, z), ca.jacobian(self.constraints, z)]),
+            "hessian": ([z, p, lam_f, lam_x, lam_g], [ca.densify(gradient), H]),
+        }
+        return StageFunctions(
+            **{
+                name: ca.Function(f"{self.name}_{name}", arguments, results, {"cse": True})
+                for name, (arguments, results) in expressions.items()
+            }
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class StageFunctions:
+    """What a solver evaluates of a stage kind; z are its states and controls."""
+
+    values: ca.Function  # (z, p) ↦ cost, next state, constraints
+    gradient: ca.Function  # (z, p) ↦ gradient of the cost
+    jacobian: ca.Function  # (z, p) ↦ Jacobians of −next state and of the constraints
+    hessian: ca.Function  # (z, p, λ_f, λ_dynamics, λ_constraints) ↦ gradient and Hessian of the Lagrangian
+
+
+class Rows:
+    """Constraint rows with their bounds, collected in the order the formulation states them."""
+
+    def __init__(self) -> None:
+        self._expressions: list[ca.SX] = []
+        self._lower: list[float] = []
+        self._upper: list[float] = []
+        self._labels: list[str] = []
+
+    def equal(self, label: str, expression: ca.SX) -> None:
+        """Add expression = 0."""
+        self.between(label, expression, 0.0, 0.0)
+
+    def between(self, label: str, expression: ca.SX, lower: float, upper: float) -> None:
+        """Add lower ≤ expression ≤ upper."""
+        self._expressions.append(expression)
+        self._labels += [label] * expression.numel()
+        self._lower += [lower] * expression.numel()
+        self._upper += [upper] * expression.numel()
+
+    def attitude(self, quaternion: ca.SX, goal: ca.SX) -> None:
+        """Add quaternion = goal, and not its negative: the attitude itself, not the one a full turn away."""
+        error = quaternion_product(conjugate(goal), quaternion)
+        self.equal("landing attitude", error[:3])
+        self.between("landing attitude", error[3], _SAME_TURN, np.inf)
+
+    def stage(self, name: str, x: ca.SX, u: ca.SX, p: ca.SX, cost: ca.SX, next_state: ca.SX | None) -> StageKind:
+        """Return the stage kind with these rows as its constraints."""
+        return StageKind(
+            name=name,
+            x=x,
+            u=u,
+            p=p,
+            cost=cost,
+            next_state=next_state,
+            constraints=ca.vertcat(ca.SX(0, 1), *self._expressions),
+            lower=np.array(self._lower),
+            upper=np.array(self._upper),
+            labels=tuple(self._labels),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class StageData:
+    """The numbers of one knot of one request."""
+
+    p: np.ndarray  # (n_p,)
+    x_min: np.ndarray  # (n_x,)
+    x_max: np.ndarray
+    u_min: np.ndarray  # (n_u,)
+    u_max: np.ndarray
+    x: np.ndarray  # guess (n_x,)
+    u: np.ndarray  # guess (n_u,)
+
+    @staticmethod
+    def free(
+        *,
+        p: np.ndarray,
+        x: np.ndarray,
+        u: np.ndarray | None = None,
+        x_min: np.ndarray | None = None,
+        x_max: np.ndarray | None = None,
+        u_min: np.ndarray | None = None,
+        u_max: np.ndarray | None = None,
+    ) -> StageData:
+        """Return a knot's data with infinite bounds where none are given, and no control where none is."""
+        u = np.zeros(0) if u is None else u
+        return StageData(
+            p=p,
+            x=x,
+            u=u,
+            x_min=np.full(len(x), -np.inf) if x_min is None else x_min,
+            x_max=np.full(len(x), np.inf) if x_max is None else x_max,
+            u_min=np.full(len(u), -np.inf) if u_min is None else u_min,
+            u_max=np.full(len(u), np.inf) if u_max is None else u_max,
+        )
