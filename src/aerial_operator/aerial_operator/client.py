@@ -55,8 +55,8 @@ class Answer:
 class Client(Node):
     """A node that selects motions; made by ``connected``."""
 
-    def __init__(self, executor: EventsExecutor) -> None:
-        super().__init__("operator", use_global_arguments=False)
+    def __init__(self, context: rclpy.Context, executor: EventsExecutor) -> None:
+        super().__init__("operator", context=context, use_global_arguments=False)
         self._executor = executor
         self._selections = self.create_publisher(MotionSelection, "motion_selection", qos.EVENT)
         self.create_subscription(MotionResult, "motion_result", self._on_result, qos.EVENT)
@@ -169,16 +169,17 @@ class Client(Node):
 @contextmanager
 def connected() -> Iterator[Client]:
     """Yield a client; it is gone when the context ends."""
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-    executor = EventsExecutor()
-    client = Client(executor)
+    context = rclpy.Context()
+    rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
+    executor = EventsExecutor(context=context)
+    client = Client(context, executor)
     executor.add_node(client)
     try:
         yield client
     finally:
         executor.shutdown()
         client.destroy_node()
-        rclpy.try_shutdown()
+        context.try_shutdown()
 
 
 def _timeout(sentence: str) -> RefusalError:

@@ -130,7 +130,11 @@ class NodeProcesses:
     @property
     def alive(self) -> bool:
         """Whether any node runs."""
-        return any(process.poll() is None for process in self._processes.values())
+        return any(map(self.running, self._processes))
+
+    def running(self, program: NodeProgram) -> bool:
+        """Return whether a node runs."""
+        return self._processes[program].poll() is None
 
     def pid(self, program: NodeProgram) -> int:
         """Return the process id of a node."""

@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> Report:
-    """Run the jumps, judge them by ground truth, leave recording and pictures."""
+    """Run the jumps, judge them by ground truth, leave a recording and a picture."""
     robot = Robot.load(args.robot)
     folder = args.out / "demo"
     folder.mkdir(parents=True, exist_ok=True)
@@ -71,7 +71,6 @@ def run(args: argparse.Namespace) -> Report:
     say("judging by ground truth, writing the recording, drawing")
     recorder.write(folder / "recording")
     trials = [None if jump.execution is None else judged(robot, recorder, jump.execution) for jump in jumps]
-    pictures = _draw(robot, jumps, trials, folder)
     motions = [_motion_figures(robot, jump, result, args) for jump, result in zip(jumps, trials, strict=True)]
     landed = all(motion["landed"] for motion in motions)
     figures = {
@@ -79,7 +78,7 @@ def run(args: argparse.Namespace) -> Report:
         "motions": motions,
         "control": control,
         "recording": str(folder / "recording"),
-        "pictures": [str(picture) for picture in pictures],
+        "picture": _draw(robot, trials, folder / "jump.png"),
     }
     return Report(success=landed, figures=figures, text=_summary(figures))
 
@@ -138,18 +137,15 @@ def _motion_figures(robot: Robot, jump: _Jump, result: Trial | None, args: argpa
     }
 
 
-def _draw(robot: Robot, jumps: list[_Jump], trials: list[Trial | None], folder: Path) -> list[Path]:
-    """Draw each jump that happened, on the terrain that was there."""
-    pictures = []
-    for jump, result in zip(jumps, trials, strict=True):
-        if result is not None:
-            path = folder / f"{jump.name.replace(' ', '_')}.png"
-            done = result.execution
-            origin, heading = robot.start_frame(result.ticks[0].truth.q)
-            terrain = done.plan.terrain.placed(origin, heading)
-            save_picture(robot, done.plan, terrain, result.ticks, done.start_time, path)
-            pictures.append(path)
-    return pictures
+def _draw(robot: Robot, trials: list[Trial | None], path: Path) -> str | None:
+    """Draw the last jump that happened, on the terrain that was there."""
+    happened = [result for result in trials if result is not None]
+    if not happened:
+        return None
+    done, ticks = happened[-1].execution, happened[-1].ticks
+    origin, heading = robot.start_frame(ticks[0].truth.q)
+    save_picture(robot, done.plan, done.plan.terrain.placed(origin, heading), ticks, done.start_time, path)
+    return str(path)
 
 
 def _summary(figures: Mapping[str, Any]) -> str:
@@ -164,7 +160,7 @@ def _summary(figures: Mapping[str, Any]) -> str:
             f"  control    {control['rate_hz']:.0f} Hz, {control['missed_ticks']} of {control['ticks']} ticks missed "
             f"({100 * share:.2f} %), round trip {round_trip['p50']:.0f} µs (99 %: {round_trip['p99']:.0f} µs)",
             f"  recording  {figures['recording']}",
-            *(f"  picture    {picture}" for picture in figures["pictures"]),
+            f"  picture    {figures['picture'] or 'none: no jump happened'}",
         ]
     )
 
