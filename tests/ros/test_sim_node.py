@@ -204,11 +204,21 @@ def test_a_refusal_lets_time_go_on(start, until):
     until(lambda: peer.states[-1].sequence > held + 50)
 
 
+def test_time_does_not_wait_for_a_selection_that_was_refused_before_it_came(start, until):
+    sim, peer = start()
+    until(lambda: len(peer.states) > 50)
+    peer.results.publish(MotionResult(request_id="one", outcome=MotionResult.REFUSED))
+    until(lambda: sim._refused == "one")
+    peer.selections.publish(selection_to_message(PLATFORM))
+    until(lambda: sim._session.simulation.terrain.boxes)
+    assert sim._session.awaited is None
+
+
 def test_terrain_does_not_change_under_a_running_motion(start, until):
     sim, peer = start()
     until(lambda: len(peer.states) > 50)
     peer.results.publish(MotionResult(request_id="zero", outcome=MotionResult.STARTED))
-    until(lambda: sim._moving)
+    until(lambda: sim._moving is not None)
     peer.selections.publish(selection_to_message(PLATFORM))
     seen = peer.states[-1].sequence
     until(lambda: peer.states[-1].sequence > seen + 100)

@@ -68,7 +68,8 @@ class SimNode(AerialNode):
         self._lock = threading.RLock()  # guards the session: the pacing thread and the callbacks use it
         self._real_time: bool = self._parameter("real_time")
         self._active = False
-        self._moving = False  # a motion runs: no time to rebuild the terrain
+        self._moving: str | None = None  # request whose motion runs: no time to rebuild the terrain
+        self._refused: str | None = None  # request last refused: time need not wait for it
         self._pacer: threading.Thread | None = None
         self._published_at = [0.0] * ROUND_TRIP_WINDOW  # of the last states, monotonic [s]
         self._wait_until = 0.0  # when lock-step stops waiting for a plan, monotonic [s]
@@ -222,7 +223,7 @@ class SimNode(AerialNode):
 
     def _on_selection(self, message: MotionSelection) -> None:
         """Put the selected terrain ahead of the robot; in lock-step, hold time until the plan is there."""
-        if self._moving or message.motion in list(ControllerCommand):
+        if self._moving is not None or message.motion in list(ControllerCommand):
             return
         try:
             request = selection_from_message(message)
@@ -234,15 +235,17 @@ class SimNode(AerialNode):
             terrain = placed_ahead(self._robot, q, simulation.terrain, request.terrain)
             if terrain.boxes or simulation.terrain.boxes:
                 simulation.set_terrain(terrain)
-            if not self._real_time:
+            if not self._real_time and request.request_id != self._refused:
                 self._session.awaited = request.request_id
                 self._wait_until = time.monotonic() + PLAN_TIMEOUT
 
     def _on_result(self, message: MotionResult) -> None:
         if message.outcome == MotionResult.STARTED:
-            self._moving = True
-        elif message.outcome in _FINAL:
-            self._moving = False
+            self._moving = message.request_id
+        elif message.outcome in _FINAL and message.request_id == self._moving:
+            self._moving = None
+        elif message.outcome == MotionResult.REFUSED:
+            self._refused = message.request_id  # the answer may outrun the selection
         with self._lock:
             if message.request_id != self._session.awaited:
                 return
@@ -261,7 +264,7 @@ class SimNode(AerialNode):
         with self._lock:
             self._session.reset(request.seed)
             self._round_trip, self._late_ticks, self._rejected_commands = Latency(), 0, 0
-            self._moving = False
+            self._moving = None
             self._publish_state()
         response.success = True
         return response
