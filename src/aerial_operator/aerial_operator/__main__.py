@@ -22,6 +22,7 @@ COMMANDS = {
     "demo": "jump forward, backward, to the left and onto a platform: three nodes in real time, then a table",
     "plan": "plan one motion and print its figures",
     "simulate": "plan one motion, then run it in closed loop in one process, and judge the landing",
+    "compile": "compile the planner's functions once, so that plans take half the time",
     "up": "start planner, controller and simulator, and keep them running",
     "select": "ask running nodes for one motion, and wait for what comes of it",
 }

@@ -8,6 +8,7 @@ import contextlib
 from aerial_model.errors import RefusalError
 from aerial_model.request import MotionRequest
 from aerial_model.robot import Robot
+from aerial_planner.compiled import default_cache
 from aerial_planner.planner import Planner
 
 
@@ -21,7 +22,7 @@ def add_planner_arguments(parser: argparse.ArgumentParser) -> None:
 
 def warm_planner(args: argparse.Namespace, robot: Robot, request: MotionRequest) -> Planner:
     """Return a planner whose problems are built: what a user waits for a plan is what a running planner takes."""
-    planner = Planner(robot, solver=args.solver)
+    planner = Planner(robot, solver=args.solver, cache=default_cache())
     with contextlib.suppress(RefusalError):  # the plan will raise it again, with its figures
         planner.warm_up(request)
     return planner

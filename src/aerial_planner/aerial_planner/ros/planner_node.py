@@ -28,6 +28,7 @@ from aerial_model.ros.messages import (
 from aerial_model.state import Estimate
 from aerial_msgs.action import PlanMotion
 from aerial_msgs.msg import MotionPlan, MotionResult, MotionSelection
+from aerial_planner.compiled import default_cache
 from aerial_planner.planner import Planner
 from aerial_planner.ros.worker import Worker
 from aerial_planner.schedule import known_motions
@@ -53,7 +54,7 @@ class PlannerNode(node.AerialNode):
     def configure(self) -> None:
         """Load the robot, make the planner, open the interfaces."""
         self._robot = Robot.load(self.get_parameter("robot").value)
-        self._planner = Planner(self._robot, solver=self.get_parameter("solver").value)
+        self._planner = Planner(self._robot, solver=self.get_parameter("solver").value, cache=default_cache())
         self._worker = Worker(self.get_parameter("niceness").value, self.get_logger())
         self._active = False
         self._odometry: Odometry | None = None
