@@ -12,7 +12,8 @@ and one gain: the state is a matrix X ``(2 + n_c, 3)`` with rows [p, v, c_1 …]
 
 Only loaded points are measured. Where a point touches down is where forward kinematics says it does: nothing is
 assumed about the height of the ground. A loaded point that moves against the filter's belief (not yet down, slipping) is
-believed less in proportion: its noise grows with the square of the disagreement, and it is anchored anew.
+believed less in proportion: its noise grows with the square of the disagreement, and it is anchored anew. So is, for a
+moment, every point that the schedule has just put on the ground.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ from aerial_wbic.target import GRAVITY
 
 P, V = 0, 1  # rows of X
 FEET = slice(2, None)
-_LOST = 1e3  # standard deviation given to what is not known [m]
-_GATE = 9.0  # squared disagreement, in variances, from which a point is believed less
+_INSTANT = 1e-3  # [s] less than a period
+_GATE = 4.0  # squared disagreement, in variances, from which a point is believed less
 
 
 class Estimator:
@@ -74,6 +75,7 @@ class Estimator:
             self._begin(measurement)
         else:
             self._predict(measurement)
+        self._loaded_since[~contact] = measurement.time
         offset, offset_velocity, roll = self._forward_kinematics(measurement)
         self._correct(offset, offset_velocity, roll, contact)
         if measurement.localization is not None:
@@ -86,9 +88,11 @@ class Estimator:
         n_c = len(offset)
         self._X = np.zeros((2 + n_c, 3))
         self._X[P] = [0.0, 0.0, self._radius.mean()] - offset.mean(axis=0)
-        self._P = np.diag([0.0, self._noise.foot_velocity**2, *np.full(n_c, _LOST**2)])
-        self._anchored = np.zeros(n_c, dtype=bool)
+        self._P = np.diag([0.0, self._noise.foot_velocity**2, *np.zeros(n_c)])
+        self._loaded_since = np.full(n_c, -np.inf)  # a robot that is switched on stands firmly
         self._roll = roll
+        for i in range(n_c):
+            self._anchor(i, offset[i])
         self._remember(measurement)
 
     def _predict(self, measurement: Measurement) -> None:
@@ -141,22 +145,32 @@ class Estimator:
         X, noise = self._X, self._noise
         loaded = np.flatnonzero(contact)
         slip = roll[loaded] - offset_velocity[loaded] - X[V]  # innovation of u_i = v + R (ω × p_i + ṗ_i)
-        variance = self._P[V, V] + noise.foot_velocity**2
-        distrust = np.maximum(1.0, np.sum(slip**2, axis=1) / (3 * _GATE * variance))
-        for i in loaded[~self._anchored[loaded] | (distrust > 1)]:
+        distrust = self._distrust(loaded, slip)
+        for i in loaded[distrust > 1]:
             self._anchor(i, offset[i])
-        self._anchored = contact.copy()
         self._roll = np.where(contact[:, None], roll, 0.0)
         if not len(loaded):
             return
         miss = X[FEET][loaded] - offset[loaded] - X[P]  # innovation of 0 = p + R p_i − c_i
+        # The points' velocities measure the same v: their mean, weighted by trust, stands for all.
+        trust = 1 / distrust
         n = len(loaded)
-        H = np.zeros((2 * n, len(X)))
+        H = np.zeros((n + 1, len(X)))
         H[:n, P] = 1.0
         H[np.arange(n), 2 + loaded] = -1.0
-        H[n:, V] = 1.0
-        variance = np.concatenate([distrust * noise.foot_position**2, distrust * noise.foot_velocity**2])
-        self._apply(H, np.vstack([miss, slip]), variance)
+        H[n, V] = 1.0
+        variance = np.append(distrust * noise.foot_position**2, noise.foot_velocity**2 / trust.sum())
+        self._apply(H, np.vstack([miss, trust @ slip / trust.sum()]), variance)
+
+    def _distrust(self, loaded: np.ndarray, slip: np.ndarray) -> np.ndarray:
+        """Return the factors ``(n,)`` by which loaded points' variances are larger than in a firm stance.
+
+        Large just after the scheduled touchdown, which may not have happened yet, and for points that slip.
+        """
+        variance = self._P[V, V] + self._noise.foot_velocity**2
+        slipping = np.sum(slip**2, axis=1) / (3 * _GATE * variance)
+        age = np.maximum(self._time - self._loaded_since[loaded], _INSTANT)
+        return np.maximum(1.0, slipping) * np.maximum(1.0, self._noise.touchdown_time / age) ** 2
 
     def _correct_position(self, position: np.ndarray) -> None:
         H = np.zeros((1, len(self._X)))

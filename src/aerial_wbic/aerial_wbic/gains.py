@@ -38,6 +38,7 @@ class EstimatorNoise:
     foot_drift: float  # of a loaded contact point, random walk [m/√s]
     foot_position: float  # of forward kinematics [m]
     foot_velocity: float  # of forward kinematics, joint-rate noise included [m/s]
+    touchdown_time: float  # after a scheduled touchdown for which contact points are believed less [s]
     localization: float  # of a measured base position [m]
     attitude_time: float  # time constant that draws the integrated gyro to the reported attitude [s]
 

@@ -1,0 +1,40 @@
+"""Gains are read from the robot's folder, and a number that makes no sense is refused by name."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from aerial_model.errors import ConfigurationError
+from aerial_wbic.controller import Controller
+from aerial_wbic.gains import Feedback
+
+
+@pytest.mark.parametrize("name", ["weight_base", "weight_force", "stiction_speed", "settling_rate", "landing_depth"])
+def test_what_is_divided_by_must_be_positive(gains, name):
+    with pytest.raises(ValueError, match=name):
+        dataclasses.replace(gains, **{name: 0.0})
+
+
+@pytest.mark.parametrize("name", ["joint_damping", "angular_momentum_damping", "fall_tilt"])
+def test_nothing_is_negative(gains, name):
+    with pytest.raises(ValueError, match=name):
+        dataclasses.replace(gains, **{name: -1.0})
+
+
+@pytest.mark.parametrize(("stiffness", "damping"), [(-1.0, 1.0), (1.0, 0.0)])
+def test_feedback_needs_damping(stiffness, damping):
+    with pytest.raises(ValueError, match="damping"):
+        Feedback(stiffness=stiffness, damping=damping)
+
+
+def test_a_misspelt_gain_is_named(robot):
+    with pytest.raises(ConfigurationError, match="did you mean 'joint_damping'"):
+        Controller(robot.with_section("controller", joint_dampning=1.0))
+
+
+def test_a_missing_section_is_named(robot):
+    bare = dataclasses.replace(robot, sections={})
+    with pytest.raises(ConfigurationError, match="controller: key 'follow' is missing"):
+        Controller(bare)

@@ -1,0 +1,98 @@
+"""Targets: the way to rest begins where the robot is, the load is shared without turning the body."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from aerial_model import rotation
+from aerial_model.robot import BASE_ANGULAR
+from aerial_wbic.target import Fold, Hold, from_plan, shared_load, support_centre
+
+GRAVITY = 9.81  # [m/s²]
+FORCE_TOLERANCE = 0.05  # [N], the regularization's part
+MOMENT_TOLERANCE = 0.05  # [N·m]
+
+
+@pytest.fixture
+def hold_of(gains):
+    def hold_of(state, height=0.25):
+        return Hold(state, 2.0, rate=10.0, com_height=height, depth=0.1, gains=gains.hold)
+
+    return hold_of
+
+
+def moments(state, force):
+    return np.cross(state.contact_positions - state.com, force).sum(axis=0)
+
+
+@pytest.mark.parametrize("acceleration", [[0, 0, 0], [1.0, -0.5, 3.0], [0, 0, -9.0]])
+def test_the_load_is_shared_without_turning_the_body(robot, state_at, acceleration):
+    state = state_at(moving=False)
+    force = shared_load(state, np.array(acceleration))
+    total = robot.mass * (np.array(acceleration) + [0, 0, GRAVITY])
+    np.testing.assert_allclose(force.sum(axis=0), total, atol=FORCE_TOLERANCE)
+    np.testing.assert_allclose(moments(state, force), 0.0, atol=MOMENT_TOLERANCE)
+    assert force[:, 2].min() >= 0
+
+
+def test_no_share_is_negative_when_the_body_leans_out(state_at):
+    state = state_at(moving=False)
+    force = shared_load(state, np.array([8.0, 0.0, 0.0]))
+    assert force[:, 2].min() >= 0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_hold_begins_where_and_as_the_robot_moves(state_at, hold_of, seed):
+    state = state_at(seed)
+    body = hold_of(state).at(2.0, state).body
+    np.testing.assert_allclose(body.com, state.com, atol=1e-9)
+    np.testing.assert_allclose(body.com_velocity, state.com_velocity, atol=1e-9)
+    np.testing.assert_allclose(body.com_acceleration, 0.0, atol=1e-9)
+    np.testing.assert_allclose(rotation.matrix(body.orientation), state.R_WB, atol=1e-9)
+    np.testing.assert_allclose(body.angular_velocity, state.R_WB @ state.v[BASE_ANGULAR], atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_hold_ends_level_over_the_support_with_the_heading_it_had(state_at, hold_of, seed):
+    state = state_at(seed)
+    hold = hold_of(state, height=0.25)
+    body = hold.at(hold.end + 2.0, state).body
+    np.testing.assert_allclose(body.com, support_centre(state) + [0, 0, 0.25], atol=1e-6)
+    assert rotation.tilt(body.orientation) < 1e-6
+    assert rotation.heading(body.orientation) == pytest.approx(rotation.heading(state.base_orientation))
+
+
+def test_a_hold_follows_its_support(state_at, hold_of):
+    """The target moves with the feet: a touchdown that comes late, or a slip, makes no error jump."""
+    here, there = state_at(1), state_at(2)
+    hold = hold_of(here)
+    offset = hold.at(2.1, here).body.com - support_centre(here)
+    np.testing.assert_allclose(hold.at(2.1, there).body.com - support_centre(there), offset, atol=1e-12)
+
+
+def test_a_hold_tells_when_it_is_reached(state_at, hold_of):
+    state = state_at(moving=False)
+    height = (state.com - support_centre(state))[2]
+    assert hold_of(state, height).reached(state)
+    assert not hold_of(state, 2 * height).reached(state)
+
+
+def test_a_fold_goes_from_the_joints_as_they_are_to_the_pose(robot, state_at):
+    state = state_at(3)
+    fold = Fold(state, 1.0, rate=5.0, pose=robot.poses["tuck"])
+    begin, end = fold.at(1.0, state), fold.at(fold.end + 2.0, state)
+    np.testing.assert_allclose(begin.joint_position, state.q[7:])
+    np.testing.assert_allclose(begin.joint_velocity, state.v[6:])
+    np.testing.assert_allclose(end.joint_position, robot.poses["tuck"], atol=1e-3)
+
+
+def test_a_plan_gives_its_sample_in_world_axes(hop, gains):
+    turned = hop.placed(np.array([1.0, 2.0, 0.0]), 0.5)
+    sample = turned.sample(0.3)
+    target = from_plan(sample, gains.follow)
+    R = rotation.matrix(sample.q[3:7])
+    np.testing.assert_allclose(target.body.angular_velocity, R @ sample.v[BASE_ANGULAR])
+    np.testing.assert_allclose(target.body.com, sample.com)
+    np.testing.assert_array_equal(target.joint_position, sample.q[7:])
+    assert target.contact.all()
