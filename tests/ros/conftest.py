@@ -13,9 +13,11 @@ def executor():
     rclpy.init()
     executor = EventsExecutor()
     yield executor
-    for node in executor.get_nodes():
-        node.destroy_node()
-    rclpy.shutdown()
+    try:
+        for node in executor.get_nodes():
+            node.destroy_node()
+    finally:
+        rclpy.try_shutdown()
 
 
 @pytest.fixture
