@@ -47,6 +47,7 @@ class Estimator:
         self._data = robot.model.createData()
         self._q = np.zeros(robot.model.nq)  # base at the origin
         self._v = np.zeros(robot.model.nv)
+        self._rows_of: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}  # by contacts
         self._radius = np.array([point.radius for point in robot.contact_points])  # (n_c,) [m]
         self.reset()
 
@@ -89,6 +90,7 @@ class Estimator:
         self._X = np.zeros((2 + n_c, 3))
         self._X[P] = [0.0, 0.0, self._radius.mean()] - offset.mean(axis=0)
         self._P = np.diag([0.0, self._noise.foot_velocity**2, *np.zeros(n_c)])
+        self._feet = np.arange(2, 2 + n_c)
         self._loaded_since = np.full(n_c, -np.inf)  # a robot that is switched on stands firmly
         self._roll = roll
         for i in range(n_c):
@@ -102,18 +104,19 @@ class Estimator:
         # The accelerometer reports the mean over the interval: it acts at the attitude half-way.
         a = rotation.matrix(midway) @ measurement.linear_acceleration + GRAVITY
         pull = min(dt / self._noise.attitude_time, 1.0)
-        self._orientation = rotation.slerp(rotation.multiply(midway, half_turn), measurement.orientation, pull)
+        self._orientation = _drawn(rotation.multiply(midway, half_turn), measurement.orientation, pull)
         X, P_, noise = self._X, self._P, self._noise
         X[P] += X[V] * dt + a * dt**2 / 2
         X[V] += a * dt
         X[FEET] += self._roll * dt
-        F = np.eye(len(X))
-        F[P, V] = dt
-        P_ = F @ P_ @ F.T
-        reach = np.array([dt**2 / 2, dt])
-        P_[:2, :2] += np.outer(reach, reach) * noise.acceleration**2
-        P_[FEET, FEET] += np.eye(len(X) - 2) * noise.foot_drift**2 * dt
-        self._P = P_
+        P_[P] += dt * P_[V]  # F P Fᵀ
+        P_[:, P] += dt * P_[:, V]
+        push = noise.acceleration**2 * dt**2
+        P_[P, P] += push * dt**2 / 4
+        P_[P, V] += push * dt / 2
+        P_[V, P] += push * dt / 2
+        P_[V, V] += push
+        P_[self._feet, self._feet] += noise.foot_drift**2 * dt
         self._remember(measurement)
 
     def _remember(self, measurement: Measurement) -> None:
@@ -143,24 +146,33 @@ class Estimator:
 
     def _correct(self, offset: np.ndarray, offset_velocity: np.ndarray, roll: np.ndarray, contact: np.ndarray) -> None:
         X, noise = self._X, self._noise
-        loaded = np.flatnonzero(contact)
-        slip = roll[loaded] - offset_velocity[loaded] - X[V]  # innovation of u_i = v + R (ω × p_i + ṗ_i)
+        self._roll = roll * contact[:, None]
+        loaded, H = self._rows(contact)
+        if not len(loaded):
+            return
+        slip = (roll - offset_velocity)[loaded] - X[V]  # innovation of u_i = v + R (ω × p_i + ṗ_i)
         distrust = self._distrust(loaded, slip)
         for i in loaded[distrust > 1]:
             self._anchor(i, offset[i])
-        self._roll = np.where(contact[:, None], roll, 0.0)
-        if not len(loaded):
-            return
         miss = X[FEET][loaded] - offset[loaded] - X[P]  # innovation of 0 = p + R p_i − c_i
         # The points' velocities measure the same v: their mean, weighted by trust, stands for all.
         trust = 1 / distrust
-        n = len(loaded)
-        H = np.zeros((n + 1, len(X)))
-        H[:n, P] = 1.0
-        H[np.arange(n), 2 + loaded] = -1.0
-        H[n, V] = 1.0
+        weights = trust / trust.sum()
         variance = np.append(distrust * noise.foot_position**2, noise.foot_velocity**2 / trust.sum())
-        self._apply(H, np.vstack([miss, trust @ slip / trust.sum()]), variance)
+        self._apply(H, np.concatenate([miss, [weights @ slip]]), variance)
+
+    def _rows(self, contact: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the indices of the loaded points ``(n,)`` and their measurement rows ``(n + 1, 2 + n_c)``."""
+        key = contact.tobytes()
+        if key not in self._rows_of:
+            loaded = np.flatnonzero(contact)
+            n = len(loaded)
+            H = np.zeros((n + 1, 2 + len(contact)))
+            H[:n, P] = 1.0
+            H[np.arange(n), 2 + loaded] = -1.0
+            H[n, V] = 1.0
+            self._rows_of[key] = loaded, H
+        return self._rows_of[key]
 
     def _distrust(self, loaded: np.ndarray, slip: np.ndarray) -> np.ndarray:
         """Return the factors ``(n,)`` by which loaded points' variances are larger than in a firm stance.
@@ -199,3 +211,9 @@ class Estimator:
         q = np.concatenate([self._X[P], self._orientation, measurement.joint_position])
         v = np.concatenate([R.T @ self._X[V], measurement.angular_velocity, measurement.joint_velocity])
         return Estimate(time=measurement.time, q=q, v=v)
+
+
+def _drawn(q: np.ndarray, towards: np.ndarray, share: float) -> np.ndarray:
+    """Return attitude ``q`` ``(4,)`` drawn to one close by, by ``share`` of the way."""
+    mixed = q + share * (np.copysign(1.0, q @ towards) * towards - q)
+    return mixed / np.sqrt(mixed @ mixed)

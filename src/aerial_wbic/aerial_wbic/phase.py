@@ -11,7 +11,6 @@ from enum import IntEnum
 
 import numpy as np
 
-from aerial_model import rotation
 from aerial_model.errors import RefusalCode, RefusalError
 from aerial_model.kinematics import Configuration
 from aerial_model.plan import Plan
@@ -49,6 +48,7 @@ class Phases:
         self._robot = robot
         self._gains = gains
         self._com_height = com_height
+        self._upright_min = np.cos(gains.fall_tilt)  # vertical part of the base's z axis
         self._foot_radius = float(np.mean([point.radius for point in robot.contact_points]))
         self._all_points = np.ones(robot.n_contacts, dtype=bool)
         self._no_point = np.zeros(robot.n_contacts, dtype=bool)
@@ -140,7 +140,7 @@ class Phases:
             return from_plan(self.plan.sample(self.time_in_plan), self._gains.follow)
         if self._next_way is not None:
             self._way, self._next_way = self._next_way(state), None
-        if isinstance(self._way, Hold) and rotation.tilt(state.base_orientation) > self._gains.fall_tilt:
+        if isinstance(self._way, Hold) and state.R_WB[2, 2] < self._upright_min:
             self._let_go(Phase.LIE)
         if self._way is None:
             return None

@@ -29,11 +29,15 @@ class Limbs:
             for joint in list(model.supports[model.frames[frame].parentJoint])[2:]:  # 0: universe, 1: base
                 chains[i, model.joints[joint].idx_v - JOINT_VELOCITY.start] = True
         self._chains = chains  # (n_c, n)
+        self._swinging: dict[bytes, np.ndarray] = {}  # what was asked before
 
     def swinging(self, contact: np.ndarray) -> np.ndarray:
         """Return the indices of the swinging joints, given which points ``(n_c,)`` carry load."""
-        loaded = self._chains[contact].any(axis=0)
-        return np.flatnonzero(self._chains[~contact].any(axis=0) & ~loaded)
+        key = contact.tobytes()
+        if key not in self._swinging:
+            loaded = self._chains[contact].any(axis=0)
+            self._swinging[key] = np.flatnonzero(self._chains[~contact].any(axis=0) & ~loaded)
+        return self._swinging[key]
 
 
 def prioritized_tasks(
