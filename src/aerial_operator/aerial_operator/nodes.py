@@ -17,6 +17,7 @@ from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 
 from aerial_model.errors import ConfigurationError
 
+REALTIME_PRIORITY = 40  # of the control loop, where the system permits it: below the kernel's own threads
 END_TIMEOUT = 5.0  # between the request to end and the end by force [s]
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")  # of numerical libraries, one each: cores are for the loop
 
@@ -72,9 +73,10 @@ PROGRAMS = (SIMULATOR, CONTROLLER, PLANNER)
 
 def parameters(robot: str, *, seed: int, noise: str, real_time: bool = True) -> dict[str, dict[str, Any]]:
     """Return the parameters of each node, by its name."""
+    loop = {"real_time": real_time, "realtime_priority": REALTIME_PRIORITY if real_time else 0}
     return {
-        SIMULATOR.name: {"robot": robot, "seed": seed, "noise": noise, "real_time": real_time},
-        CONTROLLER.name: {"robot": robot, "real_time": real_time},
+        SIMULATOR.name: {"robot": robot, "seed": seed, "noise": noise, **loop},
+        CONTROLLER.name: {"robot": robot, **loop},
         PLANNER.name: {"robot": robot},
     }
 

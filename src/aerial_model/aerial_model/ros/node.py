@@ -6,6 +6,7 @@ A node says what it is in three methods: ``configure``, ``cleanup`` and ``diagno
 from __future__ import annotations
 
 import gc
+import os
 import signal
 import sys
 import threading
@@ -27,13 +28,15 @@ _DIAGNOSTICS_PERIOD = 1.0  # [s]
 class AerialNode(LifecycleNode):
     """A lifecycle node that shares its parameters with all others.
 
-    Parameters: ``robot`` (name or folder), ``autostart`` (false: wait for a lifecycle manager).
+    Parameters: ``robot`` (name or folder), ``autostart`` (false: wait for a lifecycle manager), ``realtime_priority``
+    (1 to 99: schedule all threads of the process before ordinary ones, where the system permits it).
     """
 
     def __init__(self, name: str, **kwargs: object) -> None:
         super().__init__(name, **kwargs)
         self.declare_parameter("robot", "mini_cheetah")
         self.declare_parameter("autostart", True)
+        self.declare_parameter("realtime_priority", 0)
         self._acting = False
 
     def configure(self) -> None:
@@ -130,6 +133,7 @@ def main(make_node: Callable[[], AerialNode]) -> None:
     executor = EventsExecutor()
     executor.add_node(node)
     started = node.start()
+    _claim_processor(node)
     gc.collect()
     gc.freeze()  # what is there now stays: later collections need not look at it
     while started and not asked_to_end.is_set():  # EventsExecutor.spin() would busy-wait without serving anything
@@ -139,3 +143,18 @@ def main(make_node: Callable[[], AerialNode]) -> None:
     node.destroy_node()
     rclpy.shutdown()
     sys.exit(0 if started else 1)
+
+
+def _claim_processor(node: AerialNode) -> None:
+    """Schedule every thread there is by the node's real-time priority, those of DDS included: they carry the messages."""
+    priority = node.get_parameter("realtime_priority").value
+    if priority <= 0:
+        return
+    try:
+        for thread in os.listdir("/proc/self/task"):
+            os.sched_setscheduler(int(thread), os.SCHED_FIFO, os.sched_param(priority))
+    except OSError as error:
+        node.get_logger().info(
+            f"no real-time priority ({error.strerror}): on a busy machine the control loop will miss ticks; "
+            "an rtprio limit of the user (limits.conf) permits it"
+        )

@@ -16,11 +16,12 @@ from aerial_model.request import MotionRequest
 from aerial_model.robot import Robot
 from aerial_operator.client import Answer, Client, connected
 from aerial_operator.console import Report, percent, say, table
-from aerial_operator.nodes import SIMULATOR, NodeProcesses, parameters
+from aerial_operator.nodes import PLANNER, SIMULATOR, NodeProcesses, parameters
 from aerial_operator.pictures import save_picture
 from aerial_operator.recording import Recorder
 from aerial_operator.trial import Execution, Trial, execution, judged
 
+MOTION = "jump"
 JUMPS = {
     "0.3 m forward": (0.3, 0.0, 0.0),
     "0.2 m backward": (-0.2, 0.0, 0.0),
@@ -58,6 +59,7 @@ def run(args: argparse.Namespace) -> Report:
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     log = folder / "nodes.log"
     told = parameters(args.robot, seed=args.seed, noise=args.noise)
+    told[PLANNER.name]["warm_up"] = MOTION
     with log.open("w") as file, NodeProcesses(told, file) as nodes, connected() as client:
         os.nice(_NICENESS)
         recorder = Recorder(client)
@@ -100,7 +102,7 @@ def _await_ready(client: Client, nodes: NodeProcesses) -> None:
 
 def _jump(robot: Robot, client: Client, recorder: Recorder, name: str, displacement: tuple[float, ...]) -> _Jump:
     """Select a jump; wait until it is over and its landing has been observed."""
-    request = MotionRequest(motion="jump", displacement=displacement)
+    request = MotionRequest(motion=MOTION, displacement=displacement)
     if displacement[2]:
         request = request.with_platform(robot)
     say(f"jump {name}")
@@ -126,7 +128,7 @@ def _control_figures(before: Mapping[str, str], after: Mapping[str, str], record
 def _motion_figures(robot: Robot, jump: _Jump, result: Trial | None, args: argparse.Namespace) -> dict[str, Any]:
     last = jump.answers[-1]
     return {
-        "motion": "jump",
+        "motion": MOTION,
         "asked": jump.name,
         "robot": robot.name,
         "seed": args.seed,
