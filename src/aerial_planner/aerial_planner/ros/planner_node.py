@@ -48,7 +48,7 @@ class PlannerNode(node.AerialNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("planner", **options)
         self.declare_parameter("solver", "fatrop")
-        self.declare_parameter("niceness", 10)
+        self.declare_parameter("niceness", 5)
         self.declare_parameter("warm_up", "all")
 
     def configure(self) -> None:
