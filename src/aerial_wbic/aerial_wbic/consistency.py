@@ -21,10 +21,15 @@ RANK_THRESHOLD = 1e-6  # relative to the largest singular value
 
 
 def consistent(plan: Plan, kinematics: Kinematics, limbs: Limbs) -> Plan:
-    """Return ``plan`` with such velocities ``v`` ``(K, nv)``; all else is unchanged."""
+    """Return ``plan`` with such velocities ``v`` ``(K, nv)`` until the last contact has ended; all else is unchanged.
+
+    In the flight that follows nothing depends on the base's velocity, and the joints keep theirs.
+    """
     mass = kinematics.robot.mass
     v = plan.v.copy()
-    for k, contact in enumerate(plan.contact):
+    pushing = plan.contact.any(axis=1)
+    for k in np.flatnonzero(pushing | np.roll(pushing, 1)):  # the knot that ends the last contact too
+        contact = plan.contact[k]
         state = kinematics.at(plan.q[k], plan.v[k])
         swinging = limbs.swinging(contact)
         S = np.zeros((len(swinging), len(v[k])))
