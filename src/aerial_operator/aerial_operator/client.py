@@ -27,6 +27,7 @@ PLANNING_TIMEOUT = 15.0  # for a first answer; a planner that has just started b
 START_TIMEOUT = 3.0  # from plan to motion [s]
 MOTION_TIMEOUT = 20.0  # from start to end [s]
 DIAGNOSTICS_TIMEOUT = 5.0  # [s]
+_CHECK_PERIOD = 0.25  # [s]
 _SPIN_TIMEOUT = 0.1  # within which Ctrl-C is served [s]
 
 
@@ -55,9 +56,11 @@ class Answer:
 class Client(Node):
     """A node that selects motions; made by ``connected``."""
 
-    def __init__(self, context: rclpy.Context, executor: EventsExecutor) -> None:
+    def __init__(self, context: rclpy.Context, executor: EventsExecutor, check: Callable[[], None]) -> None:
         super().__init__("operator", context=context, use_global_arguments=False)
         self._executor = executor
+        self._check = check
+        self._next_check = 0.0
         self._selections = self.create_publisher(MotionSelection, "motion_selection", qos.EVENT)
         self.create_subscription(MotionResult, "motion_result", self._on_result, qos.EVENT)
         self.create_subscription(ControllerStatus, "controller_status", self._on_status, qos.TELEMETRY)
@@ -97,10 +100,13 @@ class Client(Node):
         """Serve messages until ``condition`` holds, ``timeout`` [s] at most; return whether it does."""
         deadline = time.monotonic() + timeout
         while not condition():
-            remaining = deadline - time.monotonic()
-            if remaining <= 0:
+            now = time.monotonic()
+            if now >= deadline:
                 return False
-            self._executor.spin_once(timeout_sec=min(_SPIN_TIMEOUT, remaining))
+            if now >= self._next_check:
+                self._next_check = now + _CHECK_PERIOD
+                self._check()
+            self._executor.spin_once(timeout_sec=min(_SPIN_TIMEOUT, deadline - now))
         return True
 
     def select(
@@ -167,12 +173,16 @@ class Client(Node):
 
 
 @contextmanager
-def connected() -> Iterator[Client]:
-    """Yield a client; it is gone when the context ends."""
+def connected(check: Callable[[], None] = lambda: None) -> Iterator[Client]:
+    """Yield a client; it is gone when the context ends.
+
+    Args:
+        check: called now and then while the client waits; what it raises ends the waiting.
+    """
     context = rclpy.Context()
     rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
     executor = EventsExecutor(context=context)
-    client = Client(context, executor)
+    client = Client(context, executor, check)
     executor.add_node(client)
     try:
         yield client

@@ -15,7 +15,7 @@ from typing import Any, TextIO
 
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 
-from aerial_model.errors import ConfigurationError
+from aerial_model.errors import ConfigurationError, RefusalCode, RefusalError
 
 REALTIME_PRIORITY = 40  # of the control loop, where the system permits it: below the kernel's own threads
 END_TIMEOUT = 5.0  # between the request to end and the end by force [s]
@@ -128,6 +128,15 @@ class NodeProcesses:
         ]
         self._buried |= {program for program, _ in dead}
         return dead
+
+    def check(self) -> None:
+        """Raise an error if a node has ended.
+
+        Raises:
+            RefusalError: with code INTERNAL and the sentence of ``newly_dead``.
+        """
+        for _, sentence in self.newly_dead():
+            raise RefusalError(RefusalCode.INTERNAL, sentence)
 
     @property
     def alive(self) -> bool:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import gc
 import os
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,7 +29,6 @@ JUMPS = {
 }  # displacement of the landing [m]
 READY_TIMEOUT = 60.0  # [s]
 STATE_TIMEOUT = 10.0  # for simulated time to go on, and for diagnostics [s]
-_LIFE_PERIOD = 0.5  # between two looks whether the nodes live [s]
 _NICENESS = 5  # of this process: recording can wait
 _DOMAINS = 100  # ROS domains 1 … 100, of which a demo takes one
 
@@ -60,11 +58,11 @@ def run(args: argparse.Namespace) -> Report:
     log = folder / "nodes.log"
     told = parameters(args.robot, seed=args.seed, noise=args.noise)
     told[PLANNER.name]["warm_up"] = MOTION
-    with log.open("w") as file, NodeProcesses(told, file) as nodes, connected() as client:
+    with log.open("w") as file, NodeProcesses(told, file) as nodes, connected(nodes.check) as client:
         os.nice(_NICENESS)
         recorder = Recorder(client)
         say(f"simulator, controller and planner start as three processes; they log to {log}")
-        _await_ready(client, nodes)
+        _await_ready(client)
         before = client.figures(SIMULATOR)
         gc.disable()
         jumps = [_jump(robot, client, recorder, name, displacement) for name, displacement in JUMPS.items()]
@@ -85,19 +83,15 @@ def run(args: argparse.Namespace) -> Report:
     return Report(success=landed, figures=figures, text=_summary(figures))
 
 
-def _await_ready(client: Client, nodes: NodeProcesses) -> None:
+def _await_ready(client: Client) -> None:
     """Wait until the robot stands and the planner is warm.
 
     Raises:
-        RefusalError: if a node ends, or it takes too long.
+        RefusalError: if it takes too long.
     """
-    deadline = time.monotonic() + READY_TIMEOUT
-    while not client.wait(lambda: not client.missing, _LIFE_PERIOD):
-        for _, sentence in nodes.newly_dead():
-            raise RefusalError(RefusalCode.INTERNAL, sentence)
-        if time.monotonic() > deadline:
-            missing = "; ".join(client.missing)
-            raise RefusalError(RefusalCode.TIMEOUT, f"not ready after {READY_TIMEOUT:.0f} s: {missing}")
+    if not client.wait(lambda: not client.missing, READY_TIMEOUT):
+        missing = "; ".join(client.missing)
+        raise RefusalError(RefusalCode.TIMEOUT, f"not ready after {READY_TIMEOUT:.0f} s: {missing}")
 
 
 def _jump(robot: Robot, client: Client, recorder: Recorder, name: str, displacement: tuple[float, ...]) -> _Jump:
