@@ -18,9 +18,8 @@ def model(robot):
 
 
 def path(robot, tuck="tuck"):
-    M = 16
     return FlightPath(
-        dt=T / M, turning=5, ready=14, tuck=robot.poses[tuck], landing=robot.poses["landing"], fraction=np.zeros(M)
+        turning=5, ready=14, tuck=robot.poses[tuck], landing=robot.poses["landing"], fraction=np.zeros(16)
     )
 
 
@@ -28,6 +27,7 @@ def fly(robot, model, alpha, *, tuck="tuck", step=0.005, rate=0.0):
     return integrate_flight(
         model,
         path(robot, tuck),
+        duration=T,
         orientation=rotation.exp(np.array([0.1, -0.2, 0.3])),
         angular_momentum=np.array(alpha),
         joint_position=robot.poses["home"],

@@ -62,6 +62,7 @@ def assemble(
     flight = integrate_flight(
         model,
         reference.flight_path,
+        duration=take_off.flight_time,
         orientation=take_off.orientation[-1],
         angular_momentum=take_off.angular_momentum[-1],
         joint_position=take_off.joint_position[-1],

@@ -30,6 +30,7 @@ def integrate_flight(
     model: BaseFrameModel,
     path: FlightPath,
     *,
+    duration: float,
     orientation: np.ndarray,
     angular_momentum: np.ndarray,
     joint_position: np.ndarray,
@@ -43,17 +44,17 @@ def integrate_flight(
     Args:
         model: the robot's base-frame functions.
         path: the legs' path.
+        duration: of the flight [s].
         orientation: of the base at take-off ``(4,)``.
         angular_momentum: α ``(3,)`` in S [kg·m²/s].
         joint_position: at take-off ``(n,)`` [rad].
         joint_velocity: at take-off ``(n,)`` [rad/s].
         step: of the integration and of the returned samples [s], shortened so that it divides the flight.
     """
-    duration = path.dt * len(path.fraction)
     n = max(1, round(duration / step))
     h = duration / n
     half_times = np.linspace(0.0, duration, 2 * n + 1)
-    q_j, dq_j = _legs(path, joint_position, joint_velocity, half_times)
+    q_j, dq_j = _legs(path, joint_position, joint_velocity, half_times, duration)
     count = len(half_times)
     inertia = np.asarray(model.inertia.map(count)(q_j.T)).T.reshape(count, 3, 3)  # symmetric
     legs_momentum = np.asarray(model.angular_momentum.map(count)(q_j.T, ca.DM.zeros(3, count), dq_j.T)).T
@@ -84,11 +85,11 @@ def integrate_flight(
 
 
 def _legs(
-    path: FlightPath, start: np.ndarray, start_rate: np.ndarray, times: np.ndarray
+    path: FlightPath, start: np.ndarray, start_rate: np.ndarray, times: np.ndarray, duration: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return joint positions and rates ``(K, n)`` along the path at ``times`` ``(K,)``."""
-    position, rate = path.at(start, times)
-    tau = min(SETTLING_TIME, path.dt * len(path.fraction))
+    position, rate = path.at(start, times, duration)
+    tau = min(SETTLING_TIME, duration)
     s = np.clip(times / tau, 0.0, 1.0)[:, None]
     position = position + tau * s * (1 - s) ** 2 * start_rate
     rate = rate + (1 - s) * (1 - 3 * s) * start_rate

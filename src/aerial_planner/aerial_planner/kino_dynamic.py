@@ -6,7 +6,8 @@ by construction; accelerations and α̇ are expressions. What stays are the mome
 (3.9a), as equalities of a knot.
 
     take-off knot   x = [r, ṙ, α, quaternion, q_j, q̇_j of the knot before],   u = [ω, q̇_j, f of the loaded contacts]
-    flight knot     x = [α, quaternion, q_j],                                u = [ω]
+    lift-off knot   x as above,   u = [ω in flight, ω and q̇_j on the ground, the flight time T]
+    flight knot     x = [α, quaternion, q_j, T],   u = [ω]
 
 The rates of the knot before give the joint accelerations: the torque limits then hold for −Jᵀf *and* the inertia of the
 legs, whose mass matrix is taken at the home pose. With (3.14) alone, which neglects it, unloaded legs whip around for
@@ -186,7 +187,7 @@ class KinoDynamic:
         landing = s.r + s.flight_time * s.rdot - ca.vertcat(0, 0, 0.5 * GRAVITY * s.flight_time**2)
         lead = s.landing_lead * ca.vertcat(s.rdot[:2], 0)
         rows.equal("landing position", landing + lead - s.landing_com)
-        flight = FlightKnot(robot, s.alpha, s.quaternion, s.q_j, s.omega, s.flight_p)
+        flight = FlightKnot(s.alpha, s.quaternion, s.q_j, s.flight_time, s.omega, s.flight_p)
         rows.equal("momentum", flight.momentum_gap(self.model))
         # The rates at which the feet leave the ground: without them the last force could be an impulse no leg follows.
         rows.equal("momentum", s.R.T @ s.alpha - self.model.angular_momentum(s.q_j, s.omega_ground, s.dq_j))
@@ -200,6 +201,7 @@ class KinoDynamic:
             w.angular_velocity * ca.sumsqr(s.omega)
             + w.joint_velocity * ca.sumsqr(s.dq_j)
             + w.joint_acceleration * ca.sumsqr(s.ddq_j)
+            + w.flight_time * (s.flight_time - s.flight_time_ref) ** 2
         )
         kind = rows.stage(f"lift_off_{contact_bits(touching)}_{self.variant.name}", s.x, s.u, s.p, cost, flight.step())
         self._kinds[key] = kind
@@ -210,13 +212,13 @@ class KinoDynamic:
         if key not in self._kinds:
             robot = self.robot
             alpha, quaternion, q_j = ca.SX.sym("alpha", 3), ca.SX.sym("quat", 4), ca.SX.sym("q_j", robot.n_joints)
-            omega, p = ca.SX.sym("omega", 3), ca.SX.sym("p", FlightKnot.n_p(robot))
-            flight = FlightKnot(robot, alpha, quaternion, q_j, omega, p)
+            T, omega, p = ca.SX.sym("T"), ca.SX.sym("omega", 3), ca.SX.sym("p", FlightKnot.n_p(robot))
+            flight = FlightKnot(alpha, quaternion, q_j, T, omega, p)
             rows = Rows()
             rows.equal("momentum", flight.momentum_gap(self.model))
             self._kinds[key] = rows.stage(
                 "flight",
-                ca.vertcat(alpha, quaternion, q_j),
+                ca.vertcat(alpha, quaternion, q_j, T),
                 omega,
                 p,
                 self.settings.weights.angular_velocity * ca.sumsqr(omega),
@@ -227,7 +229,7 @@ class KinoDynamic:
     def _touchdown_kind(self) -> StageKind:
         key = ("touchdown",)
         if key not in self._kinds:
-            x = ca.SX.sym("x", 7 + self.robot.n_joints)
+            x = ca.SX.sym("x", 8 + self.robot.n_joints)
             goal = ca.SX.sym("goal", 4)
             rows = Rows()
             rows.attitude(x[3:7], goal)
@@ -278,14 +280,17 @@ class KinoDynamic:
             reference.landing_com,
             path.parameters(0),
         ]
-        u = [guess.flight_angular_velocity[0], guess.angular_velocity[-1], guess.joint_velocity[-1]]
-        u_max = np.concatenate([np.full(6, np.inf), speed])
+        T = [guess.flight_time]
+        u = [guess.flight_angular_velocity[0], guess.angular_velocity[-1], guess.joint_velocity[-1], T]
+        shortest, longest = schedule.flight_time_range
+        u_min = np.concatenate([np.full(6, -np.inf), -speed, [shortest]])
+        u_max = np.concatenate([np.full(6, np.inf), speed, [longest]])
         stages.append(
-            StageData.free(p=np.concatenate(p), x=x[N], u=np.concatenate(u), u_min=-u_max, u_max=u_max, **in_range)
+            StageData.free(p=np.concatenate(p), x=x[N], u=np.concatenate(u), u_min=u_min, u_max=u_max, **in_range)
         )
         flight = np.hstack([guess.flight_orientation, guess.flight_joint_position])
         for k in range(1, M + 1):
-            x_k = np.concatenate([guess.angular_momentum[-1], flight[k]])
+            x_k = np.concatenate([guess.angular_momentum[-1], flight[k], T])
             if k < M:
                 stages.append(StageData.free(p=path.parameters(k), x=x_k, u=guess.flight_angular_velocity[k]))
             else:
@@ -299,7 +304,7 @@ class KinoDynamic:
         force = np.zeros((N, self.robot.n_contacts, 3))
         for k in range(N):
             force[k][schedule.contact[k]] = solution.u[k][3 + n :].reshape(-1, 3)
-        flight = np.array([x[N][6 : 13 + n], *solution.x[N + 1 :]])
+        flight = np.array([x[N][6 : 13 + n], *(x_k[:-1] for x_k in solution.x[N + 1 :])])
         return TakeOffTrajectory(
             com=x[:, :3],
             com_velocity=x[:, 3:6],
@@ -307,7 +312,8 @@ class KinoDynamic:
             orientation=x[:, 9:13],
             joint_position=x[:, 13 : 13 + n],
             angular_velocity=np.array([u[:3] for u in solution.u[:N]] + [solution.u[N][3:6]]),
-            joint_velocity=np.array([u[3 : 3 + n] for u in solution.u[:N]] + [solution.u[N][6:]]),
+            joint_velocity=np.array([u[3 : 3 + n] for u in solution.u[:N]] + [solution.u[N][6:-1]]),
+            flight_time=float(solution.u[N][-1]),
             force=force,
             flight_orientation=flight[:, 3:7],
             flight_joint_position=flight[:, 7:],

@@ -37,12 +37,13 @@ class TakeOffKnot:
             self.omega_ground = ca.SX.sym("omega_ground", 3)
             self.dt = ca.SX.sym("dt")
             self.ddq_j = (self.dq_j - self.dq_before) / self.dt
-            self.u = ca.vertcat(self.omega, self.omega_ground, self.dq_j)
-            self.flight_time, self.landing_lead = ca.SX.sym("T"), ca.SX.sym("lead")
+            self.flight_time, self.flight_time_ref = ca.SX.sym("T"), ca.SX.sym("T_ref")
+            self.u = ca.vertcat(self.omega, self.omega_ground, self.dq_j, self.flight_time)
+            self.landing_lead = ca.SX.sym("lead")
             self.landing_com = ca.SX.sym("landing_com", 3)
             self.flight_p = ca.SX.sym("flight_p", FlightKnot.n_p(robot))
             self.p = ca.vertcat(
-                self.dt, ca.vec(self.foot_ref), self.flight_time, self.landing_lead, self.landing_com, self.flight_p
+                self.dt, ca.vec(self.foot_ref), self.flight_time_ref, self.landing_lead, self.landing_com, self.flight_p
             )
             return
         self.u = ca.vertcat(self.omega, self.dq_j, self.f)
@@ -89,14 +90,15 @@ class TakeOffKnot:
 class FlightKnot:
     """A flight interval: α constant, legs on their path, the body turning so that (3.8) holds at mid-interval."""
 
-    def __init__(self, robot: Robot, alpha: ca.SX, quaternion: ca.SX, q_j: ca.SX, omega: ca.SX, p: ca.SX) -> None:
+    def __init__(self, alpha: ca.SX, quaternion: ca.SX, q_j: ca.SX, flight_time: ca.SX, omega: ca.SX, p: ca.SX) -> None:
         self.alpha, self.quaternion, self.q_j, self.omega = alpha, quaternion, q_j, omega
-        self.dt, self.fraction, self.target = p[0], p[1], p[2:]
+        self.flight_time = flight_time
+        self.dt, self.fraction, self.target = p[0] * flight_time, p[1], p[2:]
         self.step_j = self.fraction * (self.target - q_j)
 
     @staticmethod
     def n_p(robot: Robot) -> int:
-        """Number of parameters: dt, fraction of the way to the target pose, the target pose."""
+        """Number of parameters: share of the flight time, fraction of the way to the target pose, the target pose."""
         return 2 + robot.n_joints
 
     def momentum_gap(self, model: BaseFrameModel) -> ca.SX:
@@ -107,11 +109,12 @@ class FlightKnot:
         )
 
     def step(self) -> ca.SX:
-        """Return α, attitude and joint angles at the end of the interval."""
+        """Return α, attitude, joint angles and the flight time at the end of the interval."""
         return ca.vertcat(
             self.alpha,
             quaternion_product(self.quaternion, quaternion_step(self.omega, self.dt)),
             self.q_j + self.step_j,
+            self.flight_time,
         )
 
 

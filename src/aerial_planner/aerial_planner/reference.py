@@ -27,7 +27,6 @@ _SMOOTH_STEP_PEAK = 1.5  # greatest slope of the smooth step
 class FlightPath:
     """The legs' path through the flight: a smooth step to the tuck, then one to the landing pose."""
 
-    dt: float  # of the M intervals [s]
     turning: int  # knot at which the legs are tucked
     ready: int  # knot at which they are in the landing pose
     tuck: np.ndarray  # (n,) [rad]
@@ -35,12 +34,18 @@ class FlightPath:
     fraction: np.ndarray  # (M,) share of the remaining way to the pose ahead covered in each interval
 
     def parameters(self, k: int) -> np.ndarray:
-        """Return dt, fraction and pose ahead of interval ``k`` as one vector ``(2 + n,)``."""
-        return np.concatenate([[self.dt, self.fraction[k]], self.tuck if k < self.turning else self.landing])
+        """Return share of the flight time, fraction and pose ahead of interval ``k`` as one vector ``(2 + n,)``."""
+        pose = self.tuck if k < self.turning else self.landing
+        return np.concatenate([[1 / len(self.fraction), self.fraction[k]], pose])
 
-    def at(self, start: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def at_knots(self, start: np.ndarray) -> np.ndarray:
+        """Return joint positions ``(M+1, n)`` [rad] at the knots, from a take-off pose."""
+        return self.at(start, np.linspace(0.0, 1.0, len(self.fraction) + 1), 1.0)[0]
+
+    def at(self, start: np.ndarray, time: np.ndarray, flight_time: float) -> tuple[np.ndarray, np.ndarray]:
         """Return joint positions [rad] and rates [rad/s] ``(K, n)`` at ``time`` ``(K,)`` [s] from a take-off pose."""
-        turning, ready = self.turning * self.dt, self.ready * self.dt
+        dt = flight_time / len(self.fraction)
+        turning, ready = self.turning * dt, self.ready * dt
         up, up_rate = _smooth_step(np.asarray(time)[:, None] / turning)
         down, down_rate = _smooth_step((np.asarray(time)[:, None] - turning) / (ready - turning))
         position = start + up * (self.tuck - start) + down * (self.landing - self.tuck)
@@ -151,7 +156,7 @@ def _turn(schedule: Schedule, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _flight_path(schedule: Schedule, robot: Robot, stretched: np.ndarray, landing: np.ndarray) -> FlightPath:
     """Return the path that tucks as far as the legs can fold and stretch in time."""
-    M, dt = schedule.flight_knots, schedule.flight_time / schedule.flight_knots
+    M, dt = schedule.flight_knots, schedule.flight_time_range[0] / schedule.flight_knots
     turning = max(1, round(_TUCKED_AT * M))
     ready = max(turning + 1, round(_READY_AT * M))
     travel = _FOLDING_SPEED * robot.actuators.no_load_speed * dt / _SMOOTH_STEP_PEAK  # per interval (n,) [rad]
@@ -167,7 +172,7 @@ def _flight_path(schedule: Schedule, robot: Robot, stretched: np.ndarray, landin
     for first, last in ((0, turning), (turning, ready)):
         way, _ = _smooth_step(np.linspace(0.0, 1.0, last - first + 1))
         fraction[first:last] = np.diff(way) / (1 - way[:-1])
-    return FlightPath(dt=dt, turning=turning, ready=ready, tuck=tuck, landing=landing, fraction=fraction)
+    return FlightPath(turning=turning, ready=ready, tuck=tuck, landing=landing, fraction=fraction)
 
 
 def _smooth_step(s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

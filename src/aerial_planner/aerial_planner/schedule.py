@@ -18,6 +18,8 @@ from aerial_model.request import MotionRequest
 from aerial_model.robot import Robot
 
 GRAVITY = 9.81  # [m/s²]
+_CLEARANCE_SPARED = 0.6  # share of the clearance the optimizer may do without where it binds
+_FLIGHT_TIME_STRETCH = 1.2  # longest flight over the nominal one
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +57,8 @@ class Schedule:
 
     dt: float  # of the take-off knots [s]
     contact: np.ndarray  # (N, n_c) bool: contact on [t_k, t_k+1), all of the take-off
-    flight_time: float  # [s]
+    flight_time: float  # that the optimizer should stay near [s]
+    flight_time_range: tuple[float, float]  # that it must stay in [s]
     flight_knots: int  # intervals the flight is integrated with
     landing_centre: np.ndarray  # (3,) of the support at landing, in S, z: the surface [m]
     rotation: np.ndarray  # (3,) to accumulate from start to touchdown, as a rotation vector in S [rad]
@@ -126,13 +129,16 @@ def contact_schedule(
     distance = float(np.linalg.norm(displacement[:2]))
     height = float(displacement[2])
     rise = extra_rise + max(height, 0.0) + motion.flight.clearance + motion.flight.clearance_per_distance * distance
+    nominal = flight_time(rise, height)
+    shortest = flight_time(rise - _CLEARANCE_SPARED * motion.flight.clearance, height) if extra_rise == 0.0 else nominal
     turn = np.array([0.0, 0.0, request.yaw])
     if rule is not None:
         turn = turn + 2 * np.pi * turns * rule.axis
     return Schedule(
         dt=dt,
         contact=np.array(rows),
-        flight_time=flight_time(rise, height),
+        flight_time=nominal,
+        flight_time_range=(shortest, _FLIGHT_TIME_STRETCH * nominal),
         flight_knots=flight_knots,
         landing_centre=np.array(displacement),
         rotation=turn,

@@ -17,6 +17,7 @@ class Weights:
     com: float = 5.0  # [1/m²]
     com_velocity: float = 0.1  # [s²/m²]
     force: float = 1e-4  # [1/N²]
+    flight_time: float = 500.0  # [1/s²]
 
     def __post_init__(self) -> None:
         if any(value < 0 for value in vars(self).values()):

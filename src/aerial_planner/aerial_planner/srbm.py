@@ -79,8 +79,9 @@ class SingleRigidBody:
             angular_velocity=np.zeros((N + 1, 3)),
             joint_velocity=np.zeros((N + 1, self.robot.n_joints)),
             force=schedule.contact[..., None] * share / n_f,
+            flight_time=schedule.flight_time,
             flight_orientation=reference.flight_orientation,
-            flight_joint_position=reference.flight_path.at(pose, reference.flight_path.dt * np.arange(M + 1))[0],
+            flight_joint_position=reference.flight_path.at_knots(pose),
             flight_angular_velocity=np.zeros((M, 3)),
         )
 
@@ -155,29 +156,31 @@ class SingleRigidBody:
         key = ("lift_off", held)
         if key not in self._kinds:
             s = _BodySymbols(self.robot.n_contacts)
-            dt, T, lead, landing_com = ca.SX.sym("dt"), ca.SX.sym("T"), ca.SX.sym("lead"), ca.SX.sym("goal", 3)
+            share, T, T_ref, lead = (ca.SX.sym(name) for name in ("share", "T", "T_ref", "lead"))
+            landing_com = ca.SX.sym("goal", 3)
             rows = Rows()
             self._reach_rows(rows, s, held)
             rows.equal("landing position", s.landing_gap(T, lead, landing_com))
-            p = ca.vertcat(dt, T, lead, landing_com, ca.vec(s.foot_ref))
-            following = _flight_step(s.alpha, s.quaternion, dt, self.inertia_inverse)
-            self._kinds[key] = rows.stage(
-                f"body_lift_off_{contact_bits(held)}", s.x, ca.SX(0, 1), p, ca.SX(0), following
-            )
+            p = ca.vertcat(share, T_ref, lead, landing_com, ca.vec(s.foot_ref))
+            following = _flight_step(s.alpha, s.quaternion, T, share, self.inertia_inverse)
+            cost = self.settings.weights.flight_time * (T - T_ref) ** 2
+            self._kinds[key] = rows.stage(f"body_lift_off_{contact_bits(held)}", s.x, T, p, cost, following)
         return self._kinds[key]
 
     def _flight_kind(self) -> StageKind:
         key = ("flight",)
         if key not in self._kinds:
-            alpha, quaternion, dt = ca.SX.sym("alpha", 3), ca.SX.sym("quat", 4), ca.SX.sym("dt")
-            x, following = ca.vertcat(alpha, quaternion), _flight_step(alpha, quaternion, dt, self.inertia_inverse)
-            self._kinds[key] = Rows().stage("body_flight", x, ca.SX(0, 1), dt, ca.SX(0), following)
+            alpha, quaternion = ca.SX.sym("alpha", 3), ca.SX.sym("quat", 4)
+            T, share = ca.SX.sym("T"), ca.SX.sym("share")
+            x = ca.vertcat(alpha, quaternion, T)
+            following = _flight_step(alpha, quaternion, T, share, self.inertia_inverse)
+            self._kinds[key] = Rows().stage("body_flight", x, ca.SX(0, 1), share, ca.SX(0), following)
         return self._kinds[key]
 
     def _touchdown_kind(self) -> StageKind:
         key = ("touchdown",)
         if key not in self._kinds:
-            x, goal = ca.SX.sym("x", 7), ca.SX.sym("goal", 4)
+            x, goal = ca.SX.sym("x", 8), ca.SX.sym("goal", 4)
             rows = Rows()
             rows.attitude(x[3:7], goal)
             self._kinds[key] = rows.stage("body_touchdown", x, ca.SX(0, 1), goal, ca.SX(0), None)
@@ -202,13 +205,14 @@ class SingleRigidBody:
                     u_max=np.tile([np.inf, np.inf, settings.force_max], n_f),
                 )
             )
-        dt = schedule.flight_time / schedule.flight_knots
-        p = [[dt, schedule.flight_time, settings.landing_lead], reference.landing_com, foot_ref]
-        stages.append(StageData.free(p=np.concatenate(p), x=x[-1]))
+        share, T = np.array([1 / schedule.flight_knots]), np.array([schedule.flight_time])
+        shortest, longest = (np.array([bound]) for bound in schedule.flight_time_range)
+        p = [share, T, [settings.landing_lead], reference.landing_com, foot_ref]
+        stages.append(StageData.free(p=np.concatenate(p), x=x[-1], u=T, u_min=shortest, u_max=longest))
         for k in range(1, schedule.flight_knots + 1):
             last = k == schedule.flight_knots
-            x_k = np.concatenate([reference.angular_momentum[-1], reference.flight_orientation[k]])
-            stages.append(StageData.free(p=schedule.landing_orientation if last else np.array([dt]), x=x_k))
+            x_k = np.concatenate([reference.angular_momentum[-1], reference.flight_orientation[k], T])
+            stages.append(StageData.free(p=schedule.landing_orientation if last else share, x=x_k))
         return stages
 
     def _trajectory(self, schedule: Schedule, reference: Reference, solution: Solution) -> TakeOffTrajectory:
@@ -221,10 +225,10 @@ class SingleRigidBody:
         force = np.zeros((N, self.robot.n_contacts, 3))
         for k in range(N):
             force[k][schedule.contact[k]] = solution.u[k].reshape(-1, 3)
-        flight = np.array([x[N][6:], *solution.x[N + 1 :]])
+        flight = np.array([x[N][6:], *(x_k[:-1] for x_k in solution.x[N + 1 :])])
+        flight_time = float(solution.u[N][0])
         omega = np.einsum("ab,kcb,kc->ka", self.inertia_inverse, R.transpose(0, 2, 1), alpha)
         flight_R = rotation.matrix(flight[:, 3:])
-        dt = reference.flight_path.dt
         flight_omega = np.einsum("ab,kcb,kc->ka", self.inertia_inverse, flight_R.transpose(0, 2, 1), flight[:, :3])
         rates = np.diff(q_j, axis=0) / schedule.dt
         return TakeOffTrajectory(
@@ -236,8 +240,9 @@ class SingleRigidBody:
             angular_velocity=omega,
             joint_velocity=np.vstack([rates, rates[-1:]]),
             force=force,
+            flight_time=flight_time,
             flight_orientation=flight[:, 3:],
-            flight_joint_position=reference.flight_path.at(q_j[-1], dt * np.arange(schedule.flight_knots + 1))[0],
+            flight_joint_position=reference.flight_path.at_knots(q_j[-1]),
             flight_angular_velocity=flight_omega[:-1],
         )
 
@@ -262,13 +267,14 @@ class _BodySymbols:
         return landing + lead * ca.vertcat(self.rdot[:2], 0) - landing_com
 
 
-def _flight_step(alpha: ca.SX, quaternion: ca.SX, dt: ca.SX, inertia_inverse: np.ndarray) -> ca.SX:
-    """Return α and the attitude after ``dt`` of free flight of the lumped body, by the mid-point rule."""
+def _flight_step(alpha: ca.SX, quaternion: ca.SX, T: ca.SX, share: ca.SX, inertia_inverse: np.ndarray) -> ca.SX:
+    """Return α, the attitude and T after a ``share`` of the flight of the lumped body, by the mid-point rule."""
+    dt = share * T
     J = ca.DM(inertia_inverse)
     omega = J @ (rotation_matrix(quaternion).T @ alpha)
     middle = quaternion_product(quaternion, quaternion_step(omega, 0.5 * dt))
     omega_mid = J @ (rotation_matrix(middle).T @ alpha)
-    return ca.vertcat(alpha, quaternion_product(quaternion, quaternion_step(omega_mid, dt)))
+    return ca.vertcat(alpha, quaternion_product(quaternion, quaternion_step(omega_mid, dt)), T)
 
 
 def _legs(robot: Robot, model: BaseFrameModel) -> tuple[np.ndarray, np.ndarray]:

@@ -87,7 +87,7 @@ class LiteralProblem:
         self.alpha, self.alpha_dot = variable(3, K), variable(3, K)
         self.c, self.f = variable(3 * n_c, K), variable(3 * n_c, K)
         self.flight_quaternion, self.flight_q_j = variable(4, self.M + 1), variable(n, self.M + 1)
-        self.flight_omega = variable(3, self.M)
+        self.flight_omega, self.flight_time = variable(3, self.M), variable()
         self.R = [rotation_matrix(self.quaternion[:, k]) for k in range(K)]
         before = ca.horzcat(ca.MX.zeros(n, 1), self.dq_j[:, :-1])
         self.ddq_j = (self.dq_j - before) / self.schedule.dt
@@ -103,6 +103,7 @@ class LiteralProblem:
             cost += w.force * ca.sumsqr(self.f[:, k])
         cost += w.joint_velocity * ca.sumsqr(self.dq_j) + w.joint_acceleration * ca.sumsqr(self.ddq_j)
         cost += w.angular_velocity * ca.sumsqr(self.flight_omega)
+        cost += w.flight_time * (self.flight_time - self.schedule.flight_time) ** 2
         self.cost = cost
         self.opti.minimize(cost)
 
@@ -189,11 +190,14 @@ class LiteralProblem:
             self.opti.subject_to(self.opti.bounded(-share, volts / law.bus_voltage, share))  # (3.11c)
 
     def _boundary(self) -> None:
-        x_0, T = self.reference.x_0, self.schedule.flight_time
+        x_0, T = self.reference.x_0, self.flight_time
+        self.opti.subject_to(
+            self.opti.bounded(self.schedule.flight_time_range[0], T, self.schedule.flight_time_range[1])
+        )
         start = ca.vertcat(*(v[:, 0] for v in (self.r, self.rdot, self.alpha, self.quaternion, self.q_j)))
         self.opti.subject_to(start == x_0)  # 𝒳_0
         r, rdot = self.r[:, self.N], self.rdot[:, self.N]
-        landing = r + rdot * T - ca.DM([0, 0, 0.5 * GRAVITY * T**2])
+        landing = r + rdot * T - ca.vertcat(0, 0, 0.5 * GRAVITY * T**2)
         lead = self.settings.landing_lead * ca.vertcat(rdot[:2], 0)
         self.opti.subject_to(landing + lead == self.reference.landing_com)  # 𝒳_N
 
@@ -204,7 +208,7 @@ class LiteralProblem:
         subject_to(self.flight_q_j[:, 0] == self.q_j[:, self.N])
         for k in range(self.M):
             parameters = path.parameters(k)
-            dt, fraction, target = parameters[0], parameters[1], parameters[2:]
+            dt, fraction, target = parameters[0] * self.flight_time, parameters[1], parameters[2:]
             q_j, quaternion, omega = self.flight_q_j[:, k], self.flight_quaternion[:, k], self.flight_omega[:, k]
             step = fraction * (target - q_j)
             middle = rotation_matrix(quaternion_product(quaternion, quaternion_step(omega, 0.5 * dt)))
@@ -282,6 +286,7 @@ class LiteralProblem:
         }
         for variable, value in values.items():
             set_initial(variable, value.T)
+        set_initial(self.flight_time, guess.flight_time)
 
     def _trajectory(self, solution: ca.OptiSol) -> TakeOffTrajectory:
         def rows(variable: ca.MX) -> np.ndarray:
@@ -296,6 +301,7 @@ class LiteralProblem:
             angular_velocity=rows(self.omega),
             joint_velocity=rows(self.dq_j),
             force=rows(self.f)[:-1].reshape(self.N, self.robot.n_contacts, 3),
+            flight_time=float(solution.value(self.flight_time)),
             flight_orientation=rows(self.flight_quaternion),
             flight_joint_position=rows(self.flight_q_j),
             flight_angular_velocity=rows(self.flight_omega),

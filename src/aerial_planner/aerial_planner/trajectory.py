@@ -19,6 +19,7 @@ class TakeOffTrajectory:
     angular_velocity: np.ndarray  # (N+1, 3) in B, contacts held
     joint_velocity: np.ndarray  # (N+1, n)
     force: np.ndarray  # (N, n_c, 3)
+    flight_time: float  # [s]
     flight_orientation: np.ndarray  # (M+1, 4)
     flight_joint_position: np.ndarray  # (M+1, n)
     flight_angular_velocity: np.ndarray  # (M, 3) in B
