@@ -109,7 +109,8 @@ def test_a_misspelt_motion_is_one_sentence_and_the_robot_stands_on(jumped, clien
 
 def test_a_goal_3_m_away_is_refused_and_the_robot_stands_on(jumped, client, stands_on):
     _, (answer,) = client.select(MotionRequest(motion="jump", displacement=[3.0, 0.0, 0.0]))
-    assert (answer.outcome, answer.code) == ("refused", RefusalCode.OUT_OF_REACH)
+    assert answer.outcome == "refused"
+    assert answer.code in (RefusalCode.OUT_OF_REACH, RefusalCode.NO_SOLUTION)
     assert stands_on()
 
 
