@@ -22,6 +22,7 @@ from aerial_model.ros.messages import code_from_message, from_stamp, outcome_fro
 from aerial_msgs.msg import ControllerStatus, MotionResult, MotionSelection
 from aerial_operator.nodes import CONTROLLER, PLANNER, PROGRAMS, NodeProgram
 
+WARMING_UP = "warming up"  # how the planner's diagnostics begin then
 DISCOVERY_TIMEOUT = 3.0  # for a listener to be found [s]
 PLANNING_TIMEOUT = 15.0  # for a first answer; a planner that has just started builds its problems first [s]
 START_TIMEOUT = 3.0  # from plan to motion [s]
@@ -89,12 +90,15 @@ class Client(Node):
     def missing(self) -> list[str]:
         """What keeps a motion from being selected, each in a few words; empty when all is ready."""
         missing = [f"no word from {program.name}" for program in PROGRAMS if program.name not in self.diagnostics]
-        activity, _ = self.diagnostics.get(PLANNER.name, ("", {}))
-        if activity.startswith("warming up"):
-            missing.append(f"the planner is {activity}")
         if self.status is None or self.status.phase != ControllerStatus.STAND:
             missing.append("the robot does not stand")
         return missing
+
+    @property
+    def warm(self) -> bool:
+        """Whether the planner has built the problems it was told to build: until then a plan may take longer."""
+        activity, _ = self.diagnostics.get(PLANNER.name, (WARMING_UP, {}))
+        return not activity.startswith(WARMING_UP)
 
     def wait(self, condition: Callable[[], bool], timeout: float) -> bool:
         """Serve messages until ``condition`` holds, ``timeout`` [s] at most; return whether it does."""

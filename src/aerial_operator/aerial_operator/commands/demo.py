@@ -89,8 +89,8 @@ def _await_ready(client: Client) -> None:
     Raises:
         RefusalError: if it takes too long.
     """
-    if not client.wait(lambda: not client.missing, READY_TIMEOUT):
-        missing = "; ".join(client.missing)
+    if not client.wait(lambda: not client.missing and client.warm, READY_TIMEOUT):
+        missing = "; ".join(client.missing) or "the planner is warming up"
         raise RefusalError(RefusalCode.TIMEOUT, f"not ready after {READY_TIMEOUT:.0f} s: {missing}")
 
 

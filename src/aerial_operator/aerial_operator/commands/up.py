@@ -34,6 +34,8 @@ def run(args: argparse.Namespace) -> Report:
                 if not ready and not client.missing:
                     ready = True
                     say("ready. In another terminal: ./aerial select jump --to 0.3,0,0")
+                    if not client.warm:
+                        say("the planner is still warming up: the first plans may take some seconds")
                 if not ready and patience == 0:
                     say(f"not ready yet: {'; '.join(client.missing)}")
                 for program, sentence in nodes.newly_dead():
