@@ -63,7 +63,7 @@ def jumped(client, recorder, robot):
     request_id, answers = client.select(FORWARD)
     done = execution(robot, recorder, request_id)
     assert client.wait(lambda: client.time > done.end_time, PATIENCE)
-    return answers, judged(robot, recorder, done)
+    return answers, *judged(robot, recorder, [done])
 
 
 @pytest.fixture

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from aerial_evaluation.landing import OBSERVE_TIME, Landing, Tick, judge
+from aerial_model import rotation
 from aerial_model.plan import Plan
 from aerial_model.robot import Robot
 from aerial_model.ros.messages import from_stamp, plan_from_message
@@ -43,11 +44,18 @@ class Trial:
     ticks: list[Tick]  # from its start to its end
     statuses: list[ControllerStatus]  # meanwhile
     landing: Landing
+    displacement: np.ndarray  # (3,) of the support centre from start to end, in the start heading frame [m]
+    real_time_factor: float  # simulated over wall time
 
     def to_json(self, robot: Robot) -> dict[str, Any]:
         """Return the figures under the names that ``./aerial simulate --json`` gives them."""
-        plan = _plan_figures(self.execution.plan, robot)
-        return {**self.landing.to_json(), "tick_us": _tick_figures(self.statuses), "plan": plan}
+        return {
+            **self.landing.to_json(),
+            "landing_position_m": self.displacement.tolist(),
+            "tick_us": _tick_figures(self.statuses),
+            "real_time_factor": self.real_time_factor,
+            "plan": _plan_figures(self.execution.plan, robot),
+        }
 
 
 def execution(robot: Robot, recorder: Recorder, request_id: str) -> Execution | None:
@@ -61,22 +69,39 @@ def execution(robot: Robot, recorder: Recorder, request_id: str) -> Execution | 
     return Execution(plan=plan_from_message(plans[0], robot), start_time=start_time)
 
 
-def judged(robot: Robot, recorder: Recorder, done: Execution) -> Trial:
-    """Return the verdict on an execution.
+def judged(robot: Robot, recorder: Recorder, executions: list[Execution]) -> list[Trial]:
+    """Return the verdicts on executions.
 
     Raises:
-        ValueError: if the recording does not cover it.
+        ValueError: if the recording does not cover one of them.
     """
-    first, last = done.start_time - TIME_TOLERANCE, done.end_time + TIME_TOLERANCE
+    arrivals = np.array(recorder.arrivals("ground_truth"))
     truths = [ground_truth_from_message(message) for message in recorder.messages("ground_truth")]
-    truths = [truth for truth in truths if first <= truth.time <= last]
-    statuses = [
-        status for status in recorder.messages("controller_status") if first <= from_stamp(status.stamp) <= last
-    ]
+    statuses = list(recorder.messages("controller_status"))
+    return [_trial(robot, done, arrivals, truths, statuses) for done in executions]
+
+
+def _trial(
+    robot: Robot, done: Execution, arrivals: np.ndarray, truths: list[GroundTruth], statuses: list[ControllerStatus]
+) -> Trial:
+    """Return the verdict on an execution, from all that was recorded."""
+    first, last = done.start_time - TIME_TOLERANCE, done.end_time + TIME_TOLERANCE
+    seen = [k for k, truth in enumerate(truths) if first <= truth.time <= last]
+    truths = [truths[k] for k in seen]
+    wall_time = arrivals[seen[-1]] - arrivals[seen[0]]
+    statuses = [status for status in statuses if first <= from_stamp(status.stamp) <= last]
     origin, heading = robot.start_frame(truths[0].q)
     ticks = _ticks(truths, statuses)
     landing = judge(robot, done.plan, origin=origin, heading=heading, start_time=done.start_time, ticks=ticks)
-    return Trial(execution=done, ticks=ticks, statuses=statuses, landing=landing)
+    end, _ = robot.start_frame(truths[-1].q)
+    return Trial(
+        execution=done,
+        ticks=ticks,
+        statuses=statuses,
+        landing=landing,
+        displacement=rotation.matrix(rotation.about_z(-heading)) @ (end - origin),
+        real_time_factor=float((truths[-1].time - truths[0].time) / wall_time),
+    )
 
 
 def _ticks(truths: list[GroundTruth], statuses: list[ControllerStatus]) -> list[Tick]:

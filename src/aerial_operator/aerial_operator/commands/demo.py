@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import gc
+import bisect
 import os
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,6 +39,7 @@ class _Jump:
     """One jump of the demo."""
 
     name: str
+    request_id: str
     answers: list[Answer]
     execution: Execution | None  # None: it never began
 
@@ -63,22 +65,21 @@ def run(args: argparse.Namespace) -> Report:
         recorder = Recorder(client)
         say(f"simulator, controller and planner start as three processes; they log to {log}")
         _await_ready(client)
-        before = client.figures(SIMULATOR)
-        gc.disable()
+        before, began = client.figures(SIMULATOR), time.time()
         jumps = [_jump(robot, client, recorder, name, displacement) for name, displacement in JUMPS.items()]
-        gc.enable()
-        control = _control_figures(before, client.figures(SIMULATOR), recorder)
+        control = _control_figures(before, client.figures(SIMULATOR), recorder, began)
     say("judging by ground truth, writing the recording, drawing")
     recorder.write(folder / "recording")
-    trials = [None if jump.execution is None else judged(robot, recorder, jump.execution) for jump in jumps]
-    motions = [_motion_figures(robot, jump, result, args) for jump, result in zip(jumps, trials, strict=True)]
+    trials = judged(robot, recorder, [jump.execution for jump in jumps if jump.execution is not None])
+    verdicts = {trial.execution.plan.request_id: trial for trial in trials}
+    motions = [_motion_figures(robot, jump, verdicts.get(jump.request_id), args) for jump in jumps]
     landed = all(motion["landed"] for motion in motions)
     figures = {
         "landed": landed,
         "motions": motions,
         "control": control,
         "recording": str(folder / "recording"),
-        "picture": _draw(robot, trials, folder / "jump.png"),
+        "picture": str(_draw(robot, trials[-1], folder / "jump.png")) if trials else None,
     }
     return Report(success=landed, figures=figures, text=_summary(figures))
 
@@ -104,22 +105,25 @@ def _jump(robot: Robot, client: Client, recorder: Recorder, name: str, displacem
     done = execution(robot, recorder, request_id)
     if done is not None:
         client.wait(lambda: client.time > done.end_time, STATE_TIMEOUT)
-    return _Jump(name=name, answers=answers, execution=done)
+    return _Jump(name=name, request_id=request_id, answers=answers, execution=done)
 
 
-def _control_figures(before: Mapping[str, str], after: Mapping[str, str], recorder: Recorder) -> dict[str, Any]:
-    """Return how the control loop kept up between two diagnostics of the simulator."""
-    sequence = [message.sequence for message in recorder.messages("state")]
+def _control_figures(
+    before: Mapping[str, str], after: Mapping[str, str], recorder: Recorder, began: float
+) -> dict[str, Any]:
+    """Return how the control loop kept up between two diagnostics of the simulator, the first at ``began`` [s]."""
     arrival = recorder.arrivals("state")
+    sequence = [message.sequence for message in recorder.messages("state")]
+    first = bisect.bisect(arrival, began)
     return {
-        "rate_hz": (sequence[-1] - sequence[0]) / (arrival[-1] - arrival[0]),
+        "rate_hz": (sequence[-1] - sequence[first]) / (arrival[-1] - arrival[first]),
         "ticks": int(after["ticks"]) - int(before["ticks"]),
         "missed_ticks": int(after["missed_ticks"]) - int(before["missed_ticks"]),
         "round_trip_us": {name: float(after[f"round_trip_us_{name}"]) for name in ("p50", "p99")},
     }
 
 
-def _motion_figures(robot: Robot, jump: _Jump, result: Trial | None, args: argparse.Namespace) -> dict[str, Any]:
+def _motion_figures(robot: Robot, jump: _Jump, trial: Trial | None, args: argparse.Namespace) -> dict[str, Any]:
     last = jump.answers[-1]
     return {
         "motion": MOTION,
@@ -128,27 +132,24 @@ def _motion_figures(robot: Robot, jump: _Jump, result: Trial | None, args: argpa
         "seed": args.seed,
         "noise": args.noise,
         "planning_time_s": jump.answers[0].after,
-        **({"landed": False, "checks": {}, "plan": None} if result is None else result.to_json(robot)),
+        **({"landed": False, "checks": {}, "plan": None} if trial is None else trial.to_json(robot)),
         "refusal": None if last.code is None else {"code": last.code.value, "reason": last.reason},
     }
 
 
-def _draw(robot: Robot, trials: list[Trial | None], path: Path) -> str | None:
-    """Draw the last jump that happened, on the terrain that was there."""
-    happened = [result for result in trials if result is not None]
-    if not happened:
-        return None
-    done, ticks = happened[-1].execution, happened[-1].ticks
-    origin, heading = robot.start_frame(ticks[0].truth.q)
-    save_picture(robot, done.plan, done.plan.terrain.placed(origin, heading), ticks, done.start_time, path)
-    return str(path)
+def _draw(robot: Robot, trial: Trial, path: Path) -> Path:
+    """Draw a jump on the terrain that was there."""
+    done = trial.execution
+    origin, heading = robot.start_frame(trial.ticks[0].truth.q)
+    save_picture(robot, done.plan, done.plan.terrain.placed(origin, heading), trial.ticks, done.start_time, path)
+    return path
 
 
 def _summary(figures: Mapping[str, Any]) -> str:
     control = figures["control"]
     share = control["missed_ticks"] / max(control["ticks"], 1)
     round_trip = control["round_trip_us"]
-    header = ("jump", "planned in", "happened", "error", "peak torque", "peak voltage")
+    header = ("jump", "planned in", "landed", "at", "tilt", "peak torque", "peak voltage")
     return "\n".join(
         [
             table(header, [_row(motion) for motion in figures["motions"]]),
@@ -164,13 +165,14 @@ def _summary(figures: Mapping[str, Any]) -> str:
 def _row(motion: Mapping[str, Any]) -> list[str]:
     name, planned = motion["asked"], f"{motion['planning_time_s']:.2f} s"
     if not motion["checks"]:
-        return [name, planned, f"refused: {motion['refusal']['reason']}", "–", "–", "–"]
+        return [name, planned, f"no, refused: {motion['refusal']['reason']}", *["–"] * 4]
     failed = [check for check, holds in motion["checks"].items() if not holds]
     return [
         name,
         planned,
-        "landed" if motion["landed"] else f"not landed: {', '.join(failed)}",
-        f"{100 * motion['position_error_m']:.1f} cm, {motion['tilt_deg']:.1f}°",
+        "yes" if motion["landed"] else f"no: not {', '.join(failed)}",
+        ", ".join(f"{x:.2f}" for x in motion["landing_position_m"]) + " m",
+        f"{motion['tilt_deg']:.1f}°",
         percent(motion["peak_torque_ratio"]),
         percent(motion["peak_voltage_ratio"]),
     ]
