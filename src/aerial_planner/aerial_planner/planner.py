@@ -18,6 +18,7 @@ from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, Robot
 from aerial_model.state import Estimate
 from aerial_planner.assembly import ActuatorUse, actuator_use, assemble
 from aerial_planner.checks import check, clearance_deficit
+from aerial_planner.collision import CollisionModel
 from aerial_planner.compiled import FunctionLibrary
 from aerial_planner.inverse_kinematics import InverseKinematics
 from aerial_planner.kino_dynamic import KinoDynamic, Variant
@@ -33,6 +34,7 @@ from aerial_planner.transcription import Solution, SolverOptions
 
 _ITERATIONS_MAX = 50  # of one solve: those that succeed take 10 to 40
 _ITERATIONS_OF_REQUEST = 70  # after which no further flight is tried, so that a refusal takes no longer than a plan
+_TOUCH_RISE = 0.02  # [m] by which to fly higher when a link would touch the terrain
 _CLEARANCE_SPARE = 0.01  # [m] added to a miss, since the pose at the edge changes with the flight
 
 Progress = Callable[[str, int, float], None]  # stage, iterations so far, residual
@@ -111,6 +113,7 @@ class Planner:
         self._model = base_frame_model(robot)
         self._ik = InverseKinematics(robot, self._model)
         self._srbm = SingleRigidBody(robot, self._model, self._ik, self.settings, self.options, self._library)
+        self._collisions = CollisionModel(robot)
         self._kino_dynamic: dict[Variant, KinoDynamic] = {}
 
     def plan(
@@ -180,17 +183,32 @@ class Planner:
             plan = assemble(request, self.robot, self._model, schedule, reference, take_off)
             use = actuator_use(plan, self.robot)
             check(plan, schedule, solution, use, self.robot)
-            deficit = clearance_deficit(plan, self.robot)
-            if deficit == 0.0:
+            missing = self._missing_height(plan)
+            if missing == 0.0:
                 progress("checked", clock.iterations, solution.max_violation)
                 report = self._report(request, clock, plan=plan, solution=solution, use=use)
                 return PlanningResult(plan=plan, report=report, actuator_use=use)
             if clock.iterations > _ITERATIONS_OF_REQUEST:
                 raise RefusalError(
                     RefusalCode.CHECK_FAILED,
-                    f"platform edge: a foot would pass {100 * deficit:.1f} cm too low over the terrain",
+                    f"platform edge: {100 * missing:.1f} cm more height over the terrain are needed than can be had",
                 )
-            extra_rise += deficit + _CLEARANCE_SPARE  # fly higher by what the feet missed
+            extra_rise += missing + _CLEARANCE_SPARE
+
+    def _missing_height(self, plan: Plan) -> float:
+        """Return by how much a plan should fly higher over the terrain [m]; 0 if feet and links clear it.
+
+        Raises:
+            RefusalError: if links touch where more height does not help.
+        """
+        touch = self._collisions.first_touch(plan)
+        if touch is None:
+            return clearance_deficit(plan, self.robot)
+        in_flight = plan.take_off_time < touch.time < plan.landing_time
+        if touch.is_terrain and in_flight:
+            return max(clearance_deficit(plan, self.robot), _TOUCH_RISE)
+        what = "platform edge" if touch.is_terrain else "self-collision"
+        raise RefusalError(RefusalCode.CHECK_FAILED, f"{what}: {touch}")
 
     def _guess(
         self, request: MotionRequest, schedule: Schedule, reference: Reference, progress: Progress, clock: _Clock
