@@ -11,7 +11,9 @@ from aerial_wbic.controller import Controller
 from aerial_wbic.gains import Feedback
 
 
-@pytest.mark.parametrize("name", ["weight_base", "weight_force", "stiction_speed", "settling_rate", "landing_depth"])
+@pytest.mark.parametrize(
+    "name", ["weight_base", "weight_force", "stiction_speed", "settling_rate", "landing_depth", "landing_turn"]
+)
 def test_what_is_divided_by_must_be_positive(gains, name):
     with pytest.raises(ValueError, match=name):
         dataclasses.replace(gains, **{name: 0.0})

@@ -64,6 +64,7 @@ class ControllerGains:
     stiction_speed: float  # width of the friction feed-forward's sign change [rad/s]
     settling_rate: float  # at which motion dies away after touchdown and at the first measurement [1/s]
     landing_depth: float  # to which the centre of mass sinks while it is caught [m]
+    landing_turn: float  # to which the base turns on while it is caught [rad]
     lying_height: float  # of the centre of mass above the ground where the joints are let go [m]
     lying_rate: float  # at which the robot sinks to it, and at which it folds its legs [1/s]
     fall_tilt: float  # of the base; beyond it the robot has fallen, except in a motion [rad]
@@ -74,7 +75,15 @@ class ControllerGains:
 
     def __post_init__(self) -> None:
         _check_not_negative(self)
-        for name in ("weight_base", "weight_force", "stiction_speed", "settling_rate", "landing_depth", "lying_rate"):
+        for name in (
+            "weight_base",
+            "weight_force",
+            "stiction_speed",
+            "settling_rate",
+            "landing_depth",
+            "landing_turn",
+            "lying_rate",
+        ):
             if getattr(self, name) == 0:
                 raise ValueError(f"{name} must be positive, found 0")
 

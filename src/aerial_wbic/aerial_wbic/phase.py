@@ -186,6 +186,7 @@ class Phases:
             rate=rate,
             com_height=com_height - self._foot_radius,
             depth=self._gains.landing_depth,
+            turn=self._gains.landing_turn,
             gains=self._gains.hold,
         )
 

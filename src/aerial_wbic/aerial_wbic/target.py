@@ -87,14 +87,15 @@ class Hold:
     All contact points are taken to be on the ground. The way to rest is one of the centre of mass *relative to the
     centre of its support* and of the attitude, from how the robot moves at the beginning: neither an early nor a late
     touchdown makes the error jump. A fall is caught within a given depth; forward speed is braked while the feet bear
-    that load, which is when friction can.
+    that load, which is when friction can. A rotation is caught within a given angle.
 
     Args:
         state: of the robot at the beginning.
         time: of the beginning [s].
-        rate: at which motion dies away [1/s]; the vertical one faster where the depth asks for it.
+        rate: at which motion dies away [1/s]; falling and turning faster where the depth and the turn ask for it.
         com_height: of the centre of mass above the centre of the contact spheres, at rest [m].
         depth: to which a fall is caught [m].
+        turn: to which a rotation is caught [rad].
         gains: of the base task.
     """
 
@@ -106,6 +107,7 @@ class Hold:
         rate: float,
         com_height: float,
         depth: float,
+        turn: float,
         gains: BodyGains,
     ) -> None:
         self._gains = gains
@@ -118,7 +120,8 @@ class Hold:
         # The attitude as a rotation vector from the level attitude of the present heading.
         self._level = rotation.about_z(rotation.heading(state.base_orientation))
         tilt = rotation.log(rotation.multiply(state.base_orientation, rotation.conjugate(self._level)))
-        self._tilt = Settling(tilt, state.R_WB @ state.v[BASE_ANGULAR], np.zeros(3), rate)
+        spin = state.R_WB @ state.v[BASE_ANGULAR]
+        self._tilt = Settling(tilt, spin, np.zeros(3), max(rate, Settling.REACH * np.linalg.norm(spin) / turn))
         self._contact = np.ones(state.robot.n_contacts, dtype=bool)
         self._zeros = np.zeros(state.robot.n_joints)
         self.end = time + Settling.TIME / rate
