@@ -60,5 +60,5 @@ def test_links_that_meet_in_the_home_pose_are_no_pair(collisions, forward, robot
 
 def test_landing_with_shanks_over_the_edge_jumped_off_is_refused(planner):
     with pytest.raises(RefusalError, match=r"platform edge: h[lr]_shank would touch the terrain") as refusal:
-        planner.plan(jump(0.42, 0.0, -0.1, terrain=Terrain.platform(-0.1, 0.22, 0.0)))
+        planner.plan(jump(0.5, 0.0, -0.1, terrain=Terrain.platform(-0.1, 0.25, 0.0)))
     assert refusal.value.code is RefusalCode.CHECK_FAILED

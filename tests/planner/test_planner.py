@@ -33,7 +33,7 @@ GOALS = [
     ("turning", jump(0.2, 0.1, yaw=0.8)),
     ("quarter turn", jump(0.0, 0.0, yaw=-np.pi / 2)),
     ("onto a platform", jump(0.6, 0.0, 0.16, terrain=Terrain.platform(0.16, 0.3, 0.0))),
-    ("off a platform", jump(0.6, 0.0, -0.16, terrain=Terrain.platform(-0.16, 0.24, 0.0))),
+    ("off a platform", jump(0.7, 0.0, -0.16, terrain=Terrain.platform(-0.16, 0.24, 0.0))),
 ]
 
 

@@ -27,7 +27,7 @@ import numpy as np
 from aerial_model.contact import friction_pyramid
 from aerial_model.robot import Robot
 from aerial_planner.compiled import FunctionLibrary
-from aerial_planner.knots import FlightKnot, TakeOffKnot, foot_velocities, joint_inertia, world_feet
+from aerial_planner.knots import FlightKnot, TakeOffKnot, foot_velocities, joint_inertia, link_slopes, world_feet
 from aerial_planner.reference import Reference
 from aerial_planner.schedule import GRAVITY, Schedule, contact_bits
 from aerial_planner.settings import PlannerSettings
@@ -129,9 +129,11 @@ class KinoDynamic:
             rows.equal("start", s.x - s.x_0)
         else:
             feet = world_feet(self.model, s)
+            slopes = link_slopes(robot, self.model, s.q_j, s.R)
             for i in range(n_c):
                 if touching[i]:
                     rows.equal("feet", feet[:, i] - s.foot_ref[:, i])  # (3.9a)
+                    rows.between("crouch", slopes[i], settings.link_slope, np.inf)
                 elif not loaded[i]:
                     rows.between("ground", feet[2, i] - s.foot_ref[2, i], 0.0, np.inf)  # (3.10)
         rows.equal("momentum", R.T @ s.alpha - self.model.angular_momentum(s.q_j, s.omega, s.dq_j))  # (3.8)

@@ -12,6 +12,8 @@ from aerial_model.robot import JOINT_VELOCITY, Robot
 from aerial_planner.schedule import GRAVITY
 from aerial_planner.symbolic import BaseFrameModel, quaternion_product, quaternion_step, rotation_matrix
 
+_POINT = 1e-3  # a contact nearer to its joint than this stands on no link [m]
+
 
 def joint_inertia(robot: Robot) -> np.ndarray:
     """Return the joints' block of the mass matrix ``(n, n)`` at the home pose, rotor inertia included [kg·m²]."""
@@ -122,6 +124,14 @@ def world_feet(model: BaseFrameModel, s: TakeOffKnot) -> ca.SX:
     """Return c_i ``(3, n_c)`` [m] in S from the centre of mass and the attitude (3.7)."""
     relative = model.feet(s.q_j) - ca.repmat(model.com(s.q_j), 1, s.foot_ref.shape[1])
     return ca.repmat(s.r, 1, s.foot_ref.shape[1]) + s.R @ relative
+
+
+def link_slopes(robot: Robot, model: BaseFrameModel, q_j: ca.SX, R: ca.SX) -> ca.SX:
+    """Return the sine ``(n_c,)`` of the slope of the link that carries each contact point."""
+    q_0 = robot.poses["home"]
+    lengths = np.linalg.norm(np.asarray(model.last_joints(q_0)) - np.asarray(model.feet(q_0)), axis=0)
+    rise = (R @ (model.last_joints(q_j) - model.feet(q_j)))[2, :]
+    return rise.T / np.maximum(lengths, _POINT)
 
 
 def foot_velocities(model: BaseFrameModel, s: TakeOffKnot) -> list[ca.SX]:

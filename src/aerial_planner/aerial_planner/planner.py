@@ -138,7 +138,7 @@ class Planner:
 
     def warm_up(self, request: MotionRequest) -> None:
         """Build the problems of a request's schedule, so that its first plan is as fast as later ones."""
-        schedule = self._schedule(request, load_motion(request.motion), 0.0)
+        schedule = self._schedule(request, load_motion(request.motion))
         self._srbm.problem(schedule)
         self._stage(self._variant(request)).problem(schedule)
 
@@ -157,7 +157,7 @@ class Planner:
             raise ValueError("a planner without a cache has nowhere to compile to")
         kinds: dict[str, StageKind] = {}
         for request in requests:
-            schedule = self._schedule(request, load_motion(request.motion), 0.0)
+            schedule = self._schedule(request, load_motion(request.motion))
             for stage in (self._srbm, self._stage(self._variant(request))):
                 kinds.update((kind.name, kind) for kind in stage.kinds(schedule))
         compiled = 0
@@ -173,9 +173,9 @@ class Planner:
         variant = self._variant(request)
         motion = load_motion(request.motion)
         q_start = self._start_configuration(start)
-        extra_rise = 0.0
+        least_rise = 0.0
         while True:
-            schedule = self._schedule(request, motion, extra_rise)
+            schedule = self._schedule(request, motion, least_rise)
             reference = body_reference(schedule, q_start, self.robot, self._model, self._ik, self.settings)
             screen(request, schedule, reference, self.robot)
             guess = self._guess(request, schedule, reference, progress, clock)
@@ -183,30 +183,27 @@ class Planner:
             plan = assemble(request, self.robot, self._model, schedule, reference, take_off)
             use = actuator_use(plan, self.robot)
             check(plan, schedule, solution, use, self.robot)
-            missing = self._missing_height(plan)
+            missing, reason = self._missing_height(plan)
             if missing == 0.0:
                 progress("checked", clock.iterations, solution.max_violation)
                 report = self._report(request, clock, plan=plan, solution=solution, use=use)
                 return PlanningResult(plan=plan, report=report, actuator_use=use)
             if clock.iterations > _ITERATIONS_OF_REQUEST:
-                raise RefusalError(
-                    RefusalCode.CHECK_FAILED,
-                    f"platform edge: {100 * missing:.1f} cm more height over the terrain are needed than can be had",
-                )
-            extra_rise += missing + _CLEARANCE_SPARE
+                raise RefusalError(RefusalCode.CHECK_FAILED, f"platform edge: {reason}, also on a higher flight")
+            least_rise = float(plan.com[:, 2].max()) - plan.landing_com_height + missing + _CLEARANCE_SPARE
 
-    def _missing_height(self, plan: Plan) -> float:
-        """Return by how much a plan should fly higher over the terrain [m]; 0 if feet and links clear it.
+    def _missing_height(self, plan: Plan) -> tuple[float, str]:
+        """Return by how much a plan should fly higher over the terrain [m], and why; 0 if feet and links clear it.
 
         Raises:
             RefusalError: if links touch where more height does not help.
         """
+        deficit = clearance_deficit(plan, self.robot)
         touch = self._collisions.first_touch(plan)
         if touch is None:
-            return clearance_deficit(plan, self.robot)
-        in_flight = plan.take_off_time < touch.time < plan.landing_time
-        if touch.is_terrain and in_flight:
-            return max(clearance_deficit(plan, self.robot), _TOUCH_RISE)
+            return deficit, f"a foot would pass {100 * deficit:.1f} cm too low"
+        if touch.is_terrain and plan.take_off_time < touch.time < plan.landing_time:
+            return max(deficit, _TOUCH_RISE), str(touch)
         what = "platform edge" if touch.is_terrain else "self-collision"
         raise RefusalError(RefusalCode.CHECK_FAILED, f"{what}: {touch}")
 
@@ -246,9 +243,9 @@ class Planner:
         progress("kino_dynamic", clock.iterations, solution.max_violation)
         return take_off, solution
 
-    def _schedule(self, request: MotionRequest, motion: Motion, extra_rise: float) -> Schedule:
+    def _schedule(self, request: MotionRequest, motion: Motion, least_rise: float = 0.0) -> Schedule:
         settings = self.settings
-        return contact_schedule(request, motion, self.robot, settings.dt, settings.flight_knots, extra_rise)
+        return contact_schedule(request, motion, self.robot, settings.dt, settings.flight_knots, least_rise)
 
     def _stage(self, variant: Variant) -> KinoDynamic:
         if variant not in self._kino_dynamic:

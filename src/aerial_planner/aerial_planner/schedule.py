@@ -110,9 +110,18 @@ def flight_time(rise: float, height: float) -> float:
 
 
 def contact_schedule(
-    request: MotionRequest, motion: Motion, robot: Robot, dt: float, flight_knots: int, extra_rise: float = 0.0
+    request: MotionRequest, motion: Motion, robot: Robot, dt: float, flight_knots: int, least_rise: float = 0.0
 ) -> Schedule:
-    """Return the schedule of a request; ``extra_rise`` [m] makes the flight higher than the motion's own rule.
+    """Return the schedule of a request.
+
+    Args:
+        request: motion and goal.
+        motion: what its YAML says.
+        robot: whose contact points are scheduled.
+        dt: of the take-off knots [s].
+        flight_knots: intervals of the flight.
+        least_rise: that the centre of mass must rise above its height over the ground it starts from, where the
+            motion's own rule asks for less [m].
 
     Raises:
         RefusalError: if the request sets something the motion does not have.
@@ -128,9 +137,9 @@ def contact_schedule(
     displacement = request.displacement if np.any(request.displacement) else motion.displacement
     distance = float(np.linalg.norm(displacement[:2]))
     height = float(displacement[2])
-    rise = extra_rise + max(height, 0.0) + motion.flight.clearance + motion.flight.clearance_per_distance * distance
-    nominal = flight_time(rise, height)
-    shortest = flight_time(rise - _CLEARANCE_SPARED * motion.flight.clearance, height) if extra_rise == 0.0 else nominal
+    rise = max(height, 0.0) + motion.flight.clearance + motion.flight.clearance_per_distance * distance
+    shortest = flight_time(max(least_rise, rise - _CLEARANCE_SPARED * motion.flight.clearance), height)
+    nominal = max(shortest, flight_time(rise, height))
     turn = np.array([0.0, 0.0, request.yaw])
     if rule is not None:
         turn = turn + 2 * np.pi * turns * rule.axis

@@ -17,7 +17,7 @@ class Weights:
     com: float = 5.0  # [1/m²]
     com_velocity: float = 0.1  # [s²/m²]
     force: float = 1e-4  # [1/N²]
-    flight_time: float = 500.0  # [1/s²]
+    flight_time: float = 2000.0  # [1/s²]
 
     def __post_init__(self) -> None:
         if any(value < 0 for value in vars(self).values()):
@@ -36,6 +36,9 @@ class PlannerSettings:
     speed_margin: float = 0.9  # share of the no-load speed a plan may use
     force_max: float = 300.0  # greatest normal force of one contact [N]
     force_min: float = 0.0  # least normal force of one loaded contact [N]
+    link_slope: float = (
+        0.25  # least slope (sine) of a link that stands on a contact: flatter, it would touch the ground
+    )
     reach: float = 0.97  # β of (3.18): share of the longest leg the single-rigid-body stage may use
     landing_lead: float = 0.05  # time by which landing feet are set ahead of the centre of mass along its velocity [s]
     weights: Weights = field(default_factory=Weights)

@@ -28,6 +28,7 @@ class BaseFrameModel:
 
     com: ca.Function  # q_j ↦ centre of mass (3,) [m]
     feet: ca.Function  # q_j ↦ contact points (3, n_c) [m]
+    last_joints: ca.Function  # q_j ↦ origin of the joint that carries each contact point (3, n_c) [m]
     foot_jacobians: ca.Function  # q_j ↦ stacked ∂foot_i/∂q_j (3 n_c, n), sparse
     angular_momentum: ca.Function  # q_j, ω (3,) in B, q̇_j (n,) ↦ α_B (3,) about the centre of mass [kg·m²/s]
     inertia: ca.Function  # q_j ↦ locked rotational inertia about the centre of mass (3, 3) [kg·m²]
@@ -74,10 +75,11 @@ def base_frame_model(robot: Robot) -> BaseFrameModel:
     com = moment / mass
     alpha = angular - ca.cross(com, linear)
 
-    feet = []
+    feet, last_joints = [], []
     for frame_id in robot.contact_frames:
         frame = model.frames[frame_id]
         parent = frame.parentJoint
+        last_joints.append(p[parent])
         feet.append(p[parent] + R[parent] @ _constant(frame.placement.translation))
     jacobians = ca.vertcat(*[ca.jacobian(foot, q) for foot in feet])
     inertia_at_com = ca.jacobian(alpha, omega)
@@ -85,6 +87,7 @@ def base_frame_model(robot: Robot) -> BaseFrameModel:
     return BaseFrameModel(
         com=ca.Function("com", [q], [com], names, ["com"]),
         feet=ca.Function("feet", [q], [ca.horzcat(*feet)], names, ["feet"]),
+        last_joints=ca.Function("last_joints", [q], [ca.horzcat(*last_joints)], names, ["last_joints"]),
         foot_jacobians=ca.Function("foot_jacobians", [q], [jacobians], names, ["J"]),
         angular_momentum=ca.Function("alpha", [q, omega, dq], [alpha], ["q_j", "omega", "dq_j"], ["alpha_B"]),
         inertia=ca.Function("inertia", [q], [inertia_at_com], names, ["I"]),

@@ -17,7 +17,7 @@ import numpy as np
 from aerial_model import rotation
 from aerial_model.robot import Robot
 from aerial_planner.kino_dynamic import Variant
-from aerial_planner.knots import joint_inertia
+from aerial_planner.knots import joint_inertia, link_slopes
 from aerial_planner.reference import Reference
 from aerial_planner.schedule import GRAVITY, Schedule
 from aerial_planner.settings import PlannerSettings
@@ -138,12 +138,15 @@ class LiteralProblem:
         mu, subject_to = self.robot.friction_coefficient, self.opti.subject_to
         feet = self.reference.foot_position
         for k in range(self.N + 1):
+            slopes = link_slopes(self.robot, self.model, self.q_j[:, k], self.R[k])
             for i in range(self.robot.n_contacts):
                 rows = slice(3 * i, 3 * i + 3)
                 held = k > 0 and self.schedule.contact[k - 1, i]
                 loaded = k < self.N and self.schedule.contact[k, i]
                 if held:
                     subject_to(self.c[rows, k] == feet[i])  # (3.9a): where it stood before
+                    if k < self.N:
+                        subject_to(slopes[i] >= self.settings.link_slope)
                 elif not loaded and 0 < k < self.N:
                     subject_to(self.c[3 * i + 2, k] >= feet[i, 2])  # (3.10)
                 force = self.f[rows, k]
