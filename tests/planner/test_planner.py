@@ -177,6 +177,16 @@ def test_a_plan_starts_where_the_robot_stands(planner, robot):
     np.testing.assert_allclose(feet, robot.contact_positions(q), atol=1e-6)
 
 
+@pytest.mark.parametrize("yaw", [-1.7, 3.1])
+def test_either_quaternion_of_the_start_attitude_gives_the_same_plan(planner, robot, yaw):
+    q = robot.standing_configuration()
+    q[BASE_ORIENTATION] = rotation.about_z(yaw)
+    opposite = q.copy()
+    opposite[BASE_ORIENTATION] *= -1
+    plans = [planner.plan(jump(0.3, 0.0), Estimate(time=0.0, q=start, v=np.zeros(18))).plan for start in (q, opposite)]
+    np.testing.assert_allclose(plans[0].com, plans[1].com, atol=POSITION_TOLERANCE)
+
+
 @pytest.mark.parametrize("variant", ["KD", "AAKD", "AAKD*"])
 @pytest.mark.parametrize("warm_start", [True, False])
 def test_every_variant_finds_the_same_easy_jump(planner, forward, variant, warm_start):

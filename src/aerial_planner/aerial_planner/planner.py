@@ -272,6 +272,8 @@ class Planner:
         q = np.array(start.q, dtype=float)
         q[BASE_POSITION] = rotation.matrix(turn) @ (q[BASE_POSITION] - origin)
         q[BASE_ORIENTATION] = rotation.multiply(turn, q[BASE_ORIENTATION])
+        if q[BASE_ORIENTATION][3] < 0:  # of the two quaternions of an attitude the one that has not turned
+            q[BASE_ORIENTATION] = -q[BASE_ORIENTATION]
         return q
 
     def _report(
