@@ -70,9 +70,9 @@ class Drive:
         )
 
     def _count(self, command: Command, measurement: Measurement) -> None:
-        torque = command.requested_torque(measurement.joint_position, measurement.joint_velocity)
-        lower, upper = self._law.torque_bounds(measurement.joint_velocity)
-        if np.any(torque < lower) or np.any(torque > upper):
+        speed = measurement.joint_velocity
+        torque = command.requested_torque(measurement.joint_position, speed)
+        if (self._law.torque_ratio(torque) > 1).any() or (self._law.voltage_ratio(torque, speed) > 1).any():
             self.saturated_ticks += 1
 
 
