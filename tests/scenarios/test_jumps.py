@@ -27,7 +27,7 @@ def jump(robot, *displacement):
 
 @pytest.mark.parametrize(
     "displacement",
-    [(0.4, 0.0, 0.0), (-0.2, 0.0, 0.0), (0.0, 0.2, 0.0), (0.6, 0.0, 0.16), (0.6, 0.0, -0.1)],
+    [(0.4, 0.0, 0.0), (-0.2, 0.0, 0.0), (0.0, 0.2, 0.0), (0.6, 0.0, 0.16), (0.7, 0.0, -0.1)],
     ids=["forward", "backward", "left", "onto a platform", "off a platform"],
 )
 def test_a_jump_lands(robot, planner, displacement):

@@ -68,6 +68,7 @@ class SimNode(AerialNode):
         self._lock = threading.RLock()  # guards the session: the pacing thread and the callbacks use it
         self._real_time: bool = self._parameter("real_time")
         self._active = False
+        self._next: RobotState | None = None  # computed, but not due yet
         self._moving: str | None = None  # request whose motion runs: no time to rebuild the terrain
         self._refused: str | None = None  # request last refused: time need not wait for it
         self._pacer: threading.Thread | None = None
@@ -82,7 +83,7 @@ class SimNode(AerialNode):
         """Publish the first state; in real time, let the clock run."""
         self._description.publish(String(data=self._robot.urdf.read_text(encoding="utf-8")))
         self._active = True
-        self._publish_state()
+        self._publish_state(state_to_message(self._session.measurement))
         if self._real_time:
             self._pacer = threading.Thread(target=self._pace, name="pace", daemon=True)
             self._pacer.start()
@@ -152,9 +153,9 @@ class SimNode(AerialNode):
     # --- time --------------------------------------------------------------------------------------------------------
 
     def _pace(self) -> None:
-        """Advance at absolute deadlines.
+        """Publish states at absolute deadlines, each computed as soon as the command for the one before was there.
 
-        A state that came out late shifts what follows: the controller has its period, counted from the state, whatever
+        Physics and measurement thus take nothing of the time a command has. A state that came out late shifts what follows: the controller has its period, counted from the state, whatever
         the machine does to this thread.
         """
         period = self._session.simulation.control_dt
@@ -169,18 +170,26 @@ class SimNode(AerialNode):
                 self._late_ticks += 1
                 deadline = now
             with self._lock:
-                if self._session.free:
-                    self._advance()
+                if self._next is None and self._session.free:
+                    self._compute_next()  # without its command
+                if self._next is not None:
+                    self._publish_next()
 
     def _go_on(self) -> None:
-        """In lock-step, advance if the answer is there and nothing holds time."""
+        """Compute the next state if the answer to the last is there and nothing holds time; in lock-step, publish it."""
         with self._lock:
-            if self._active and not self._real_time and self._session.free and self._session.answered:
-                self._advance()
+            if self._active and self._next is None and self._session.free and self._session.answered:
+                self._compute_next()
+                if not self._real_time:
+                    self._publish_next()
 
-    def _advance(self) -> None:
-        measurement = self._session.advance()
-        self._publish_state()
+    def _compute_next(self) -> None:
+        self._next = state_to_message(self._session.advance())
+
+    def _publish_next(self) -> None:
+        measurement = self._session.measurement
+        self._publish_state(self._next)
+        self._next = None
         if measurement.sequence % TELEMETRY_PERIODS == 0:
             self._time.publish(Clock(clock=to_stamp(measurement.time)))
             self._joint_states.publish(joint_state_to_message(measurement, self._robot))
@@ -188,8 +197,8 @@ class SimNode(AerialNode):
         if self._tells_truth:
             self._truths.publish(ground_truth_to_message(self._session.simulation.ground_truth(), self._robot))
 
-    def _publish_state(self) -> None:
-        self._states.publish(state_to_message(self._session.measurement))
+    def _publish_state(self, message: RobotState) -> None:
+        self._states.publish(message)
         self._published_at[self._session.measurement.sequence % ROUND_TRIP_WINDOW] = time.monotonic()
 
     def _watch(self) -> None:
@@ -200,7 +209,7 @@ class SimNode(AerialNode):
             waits = not session.answered and (not self._real_time or not session.started)
             silence = now - self._published_at[session.measurement.sequence % ROUND_TRIP_WINDOW]
             if self._active and waits and silence > REPEAT_PERIOD:
-                self._publish_state()
+                self._publish_state(state_to_message(session.measurement))
             if session.awaited is not None and now > self._wait_until:
                 self.get_logger().warning(f"selection '{session.awaited}' got no answer: time goes on")
                 self._end_wait()
@@ -264,8 +273,8 @@ class SimNode(AerialNode):
         with self._lock:
             self._session.reset(request.seed)
             self._round_trip, self._late_ticks, self._rejected_commands = Latency(), 0, 0
-            self._moving = None
-            self._publish_state()
+            self._moving = self._next = None
+            self._publish_state(state_to_message(self._session.measurement))
         response.success = True
         return response
 
