@@ -72,13 +72,20 @@ PROGRAMS = (SIMULATOR, CONTROLLER, PLANNER)
 
 
 def parameters(robot: str, *, seed: int, noise: str, real_time: bool = True) -> dict[str, dict[str, Any]]:
-    """Return the parameters of each node, by its name."""
-    loop = {"real_time": real_time, "realtime_priority": REALTIME_PRIORITY if real_time else 0}
-    return {
-        SIMULATOR.name: {"robot": robot, "seed": seed, "noise": noise, **loop},
-        CONTROLLER.name: {"robot": robot, **loop},
+    """Return the parameters of each node, by its name.
+
+    In real time, simulator and controller get a processor each, if there are two, and come first there.
+    """
+    told: dict[str, dict[str, Any]] = {
+        SIMULATOR.name: {"robot": robot, "seed": seed, "noise": noise, "real_time": real_time},
+        CONTROLLER.name: {"robot": robot, "real_time": real_time},
         PLANNER.name: {"robot": robot},
     }
+    processors = sorted(os.sched_getaffinity(0))
+    if real_time and len(processors) > 1:
+        for name, processor in zip((SIMULATOR.name, CONTROLLER.name), processors[-2:], strict=True):
+            told[name] |= {"processor": processor, "realtime_priority": REALTIME_PRIORITY}
+    return told
 
 
 class NodeProcesses:

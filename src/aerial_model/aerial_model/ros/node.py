@@ -29,7 +29,8 @@ class AerialNode(LifecycleNode):
     """A lifecycle node that shares its parameters with all others.
 
     Parameters: ``robot`` (name or folder), ``autostart`` (false: wait for a lifecycle manager), ``realtime_priority``
-    (1 to 99: schedule all threads of the process before ordinary ones, where the system permits it).
+    (1 to 99: schedule all threads of the process before ordinary ones, where the system permits it), ``processor``
+    (number of the one that all threads of the process shall share).
     """
 
     def __init__(self, name: str, **kwargs: object) -> None:
@@ -37,6 +38,7 @@ class AerialNode(LifecycleNode):
         self.declare_parameter("robot", "mini_cheetah")
         self.declare_parameter("autostart", True)
         self.declare_parameter("realtime_priority", 0)
+        self.declare_parameter("processor", -1)
         self._acting = False
 
     def configure(self) -> None:
@@ -146,15 +148,16 @@ def main(make_node: Callable[[], AerialNode]) -> None:
 
 
 def _claim_processor(node: AerialNode) -> None:
-    """Schedule every thread there is by the node's real-time priority, those of DDS included: they carry the messages."""
-    priority = node.get_parameter("realtime_priority").value
-    if priority <= 0:
-        return
+    """Place and schedule every thread there is as the parameters say, those of DDS included: they carry the messages."""
+    priority, processor = node.get_parameter("realtime_priority").value, node.get_parameter("processor").value
+    threads = [int(name) for name in os.listdir("/proc/self/task")]
     try:
-        for thread in os.listdir("/proc/self/task"):
-            os.sched_setscheduler(int(thread), os.SCHED_FIFO, os.sched_param(priority))
+        for thread in threads if processor >= 0 else ():
+            os.sched_setaffinity(thread, {processor})
+        for thread in threads if priority > 0 else ():
+            os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
     except OSError as error:
         node.get_logger().info(
-            f"no real-time priority ({error.strerror}): on a busy machine the control loop will miss ticks; "
-            "an rtprio limit of the user (limits.conf) permits it"
+            f"no processor {processor} or no real-time priority {priority} ({error.strerror}): on a busy machine the "
+            "control loop will miss ticks; an rtprio limit of the user (limits.conf) permits the priority"
         )
