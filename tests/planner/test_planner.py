@@ -231,6 +231,13 @@ def test_a_goal_that_cannot_be_is_refused_with_the_reason(planner, wanted, code,
     assert refusal.value.report.refusal == {"code": code.value, "reason": refusal.value.reason}
 
 
+def test_what_a_plan_asks_of_the_actuators_can_be_seen_instead_of_refused(robot):
+    blind = jump(0.4, 0.0, variant="KD")
+    with pytest.raises(RefusalError, match="% of its limit"):
+        Planner(robot, actuator_tolerance=0.1).plan(blind)
+    assert Planner(robot, actuator_tolerance=np.inf).plan(blind).report.peak_torque_ratio > 0.1
+
+
 @pytest.mark.parametrize("field", ["q", "v", "com", "force", "foot_position", "landing_joint_position"])
 def test_a_plan_with_a_nan_is_refused_by_name(forward, robot, field):
     value = np.array(getattr(forward.plan, field))

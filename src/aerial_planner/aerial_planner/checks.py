@@ -21,8 +21,15 @@ EDGE_MARGIN = 0.02  # of landing feet from a platform's edge [m]
 FOOT_CLEARANCE = 0.01  # of flying feet from the ground [m]
 
 
-def check(plan: Plan, schedule: Schedule, solution: Solution, use: ActuatorUse, robot: Robot) -> None:
-    """Check a plan, most telling reason first.
+def check(
+    plan: Plan,
+    schedule: Schedule,
+    solution: Solution,
+    use: ActuatorUse,
+    robot: Robot,
+    actuator_tolerance: float = ACTUATOR_TOLERANCE,
+) -> None:
+    """Check a plan, most telling reason first; exact torque, voltage and speed may be so many times their limit.
 
     Raises:
         RefusalError: naming what binds.
@@ -30,7 +37,7 @@ def check(plan: Plan, schedule: Schedule, solution: Solution, use: ActuatorUse, 
     _check_solution(solution)
     _check_attitude(plan, schedule)
     _check_turn(plan, schedule)
-    _check_actuators(use, plan, robot)
+    _check_actuators(use, plan, robot, actuator_tolerance)
     _check_joint_range(plan, robot)
     _check_landing_feet(plan, robot)
 
@@ -84,10 +91,10 @@ def _check_turn(plan: Plan, schedule: Schedule) -> None:
         raise _refuse(f"rotation: {np.rad2deg(turned):.0f}° are accumulated instead of {np.rad2deg(angle):.0f}°")
 
 
-def _check_actuators(use: ActuatorUse, plan: Plan, robot: Robot) -> None:
+def _check_actuators(use: ActuatorUse, plan: Plan, robot: Robot, tolerance: float) -> None:
     for what, ratio in (("torque", use.torque_ratio), ("voltage", use.voltage_ratio), ("speed", use.speed_ratio)):
         k, joint = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
-        if ratio[k, joint] > ACTUATOR_TOLERANCE:
+        if ratio[k, joint] > tolerance:
             when = "take-off" if plan.time[k] < plan.take_off_time else "flight"
             raise _refuse(
                 f"{robot.joint_names[joint]} {what} in {when}: {100 * ratio[k, joint]:.0f} % of its limit "

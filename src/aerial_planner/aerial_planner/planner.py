@@ -17,7 +17,7 @@ from aerial_model.request import MotionRequest
 from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, Robot
 from aerial_model.state import Estimate
 from aerial_planner.assembly import ActuatorUse, actuator_use, assemble
-from aerial_planner.checks import check, clearance_deficit
+from aerial_planner.checks import ACTUATOR_TOLERANCE, check, clearance_deficit
 from aerial_planner.collision import CollisionModel
 from aerial_planner.compiled import FunctionLibrary
 from aerial_planner.inverse_kinematics import InverseKinematics
@@ -96,6 +96,8 @@ class Planner:
         solver: ``"fatrop"`` or ``"ipopt"``.
         settings: None: the robot's.
         cache: folder of compiled functions (see ``compiled``); None: evaluate interpreted ones.
+        actuator_tolerance: exact torque, voltage or speed over its limit from which a plan is refused; infinite to see
+            what a plan asks for that is not refused for it.
     """
 
     def __init__(
@@ -105,8 +107,10 @@ class Planner:
         solver: str = "fatrop",
         settings: PlannerSettings | None = None,
         cache: Path | None = None,
+        actuator_tolerance: float = ACTUATOR_TOLERANCE,
     ) -> None:
         self.robot = robot
+        self.actuator_tolerance = actuator_tolerance
         self.settings = settings or robot.section("planner", PlannerSettings)
         self._library = FunctionLibrary(cache, robot, self.settings) if cache else None
         self.options = SolverOptions(solver=solver, max_iterations=_ITERATIONS_MAX)
@@ -182,7 +186,7 @@ class Planner:
             take_off, solution = self._optimize(variant, schedule, reference, guess, progress, clock)
             plan = assemble(request, self.robot, self._model, schedule, reference, take_off)
             use = actuator_use(plan, self.robot)
-            check(plan, schedule, solution, use, self.robot)
+            check(plan, schedule, solution, use, self.robot, self.actuator_tolerance)
             missing, reason = self._missing_height(plan)
             if missing == 0.0:
                 progress("checked", clock.iterations, solution.max_violation)
