@@ -153,7 +153,7 @@ def test_a_usage_error_keeps_to_the_contract_of_json(aerial):
     assert ended.figures["refusal"]["code"] == "usage"
 
 
-@pytest.mark.parametrize("command", ["demo", "plan", "simulate", "up", "select"])
+@pytest.mark.parametrize("command", ["demo", "plan", "simulate", "bench", "up", "select"])
 def test_every_command_explains_itself(aerial, command):
     ended = aerial(command, "--help")
     assert ended.status == 0
@@ -164,7 +164,7 @@ def test_every_command_explains_itself(aerial, command):
 def test_the_overview_names_every_command(aerial):
     ended = aerial("--help")
     assert ended.status == 0
-    for command in ("demo", "test", "plan", "simulate", "up", "select", "run"):
+    for command in ("demo", "test", "plan", "simulate", "bench", "up", "select", "run"):
         assert f"  {command} " in ended.output
 
 

@@ -1,0 +1,1 @@
+"""Timing tables: how long the parts take, how often they succeed, next to peers and to the thesis's own formulation."""

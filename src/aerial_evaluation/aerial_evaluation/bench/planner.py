@@ -1,0 +1,21 @@
+"""The planner's benchmark, section by section."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+from aerial_evaluation.bench.samples import Row
+from aerial_evaluation.bench.subject import Subject
+from aerial_evaluation.bench.variants import variants
+
+SECTIONS: dict[str, Callable[[Subject], list[Row]]] = {
+    "variants": variants,
+}
+
+
+def measured(subject: Subject, sections: Sequence[str]) -> Iterator[Row]:
+    """Yield the rows of the sections asked for, in the order of ``SECTIONS``; each names its section and robot."""
+    for name, section in SECTIONS.items():
+        if name in sections:
+            for row in section(subject):
+                yield {"section": name, "robot": subject.robot.name, **row}

@@ -1,0 +1,62 @@
+"""What a planner benchmark measures, and how often."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from aerial_model.errors import ConfigurationError
+from aerial_model.request import MotionRequest
+from aerial_model.robot import Robot
+from aerial_planner.kino_dynamic import Variant
+from aerial_planner.planner import Planner
+from aerial_planner.schedule import known_motions, load_motion
+
+FORWARD = 0.4  # where a motion goes that neither turns nor travels unless told to [m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Subject:
+    """One robot, its motions, and how often each is planned."""
+
+    robot: Robot
+    motions: tuple[str, ...]
+    repeats: int = 10
+    goals: int = 50  # of each kind
+    seed: int = 0
+    cache: Path | None = None  # of compiled functions; None: interpreted ones
+    progress: Callable[[str], None] = field(default=lambda _: None)  # told what is measured now
+
+    def __post_init__(self) -> None:
+        for motion in self.motions:
+            load_motion(motion)
+        for name in ("repeats", "goals"):
+            if getattr(self, name) < 1:
+                raise ConfigurationError(f"{name}: expected at least 1, found {getattr(self, name)}")
+
+    @cached_property
+    def planner(self) -> Planner:
+        """A planner that shows what a plan asks of the actuators instead of refusing it."""
+        return Planner(self.robot, cache=self.cache, actuator_tolerance=np.inf)
+
+
+def motions_in_order() -> tuple[str, ...]:
+    """Return the known motions, those that turn least first."""
+    turns = {name: load_motion(name).rotation for name in known_motions()}
+    return tuple(sorted(turns, key=lambda name: (0.0 if turns[name] is None else turns[name].turns, name)))
+
+
+def usual_request(motion: str, variant: Variant = Variant.AAKD_STAR, *, warm_start: bool = True) -> MotionRequest:
+    """Return the motion as its file says; one that would stay where it is goes ``FORWARD``."""
+    said = load_motion(motion)
+    stays = said.rotation is None and not np.any(said.displacement)
+    return MotionRequest(
+        motion=motion,
+        displacement=np.array([FORWARD if stays else 0.0, 0.0, 0.0]),
+        variant=variant.value,
+        warm_start=warm_start,
+    )

@@ -1,0 +1,78 @@
+"""``aerial bench``: timing tables."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from aerial_evaluation.bench.machine import machine
+from aerial_evaluation.bench.planner import SECTIONS, measured
+from aerial_evaluation.bench.subject import Subject, motions_in_order
+from aerial_model.config import closest
+from aerial_model.errors import ConfigurationError
+from aerial_model.robot import Robot
+from aerial_operator.bench_tables import tables
+from aerial_operator.console import Report, UsageError, say, to_json
+from aerial_planner.compiled import default_cache
+
+REPEATS = 10
+GOALS = 50
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what is measured, how much of it, and where the figures go."""
+    parser.add_argument("what", metavar="WHAT", choices=("planner",), help="planner")
+    parser.add_argument(
+        "--sections",
+        metavar="NAME[,…]",
+        type=_names,
+        default=tuple(SECTIONS),
+        help=f"of the benchmark (default: all): {', '.join(SECTIONS)}",
+    )
+    parser.add_argument("--motions", metavar="NAME[,…]", type=_names, help="(default: all)")
+    parser.add_argument("--repeats", metavar="N", type=int, default=REPEATS, help=f"(default: {REPEATS})")
+    parser.add_argument("--goals", metavar="N", type=int, default=GOALS, help=f"of each motion (default: {GOALS})")
+    parser.add_argument("--compiled", action="store_true", help="use what `aerial compile` made, where it made it")
+    parser.add_argument("--out", metavar="FOLDER", type=Path, default=Path("out/bench"), help="(default: out/bench)")
+
+
+def run(args: argparse.Namespace) -> Report:
+    """Measure section by section; the file holds what is measured so far, if a long run is interrupted."""
+    for name in args.sections:
+        if name not in SECTIONS:
+            raise UsageError(f"no section '{name}'{closest(name, SECTIONS)}; there are {', '.join(SECTIONS)}")
+    subject = Subject(
+        robot=Robot.load(args.robot),
+        motions=args.motions or motions_in_order(),
+        repeats=args.repeats,
+        goals=args.goals,
+        seed=args.seed,
+        cache=default_cache() if args.compiled else None,
+        progress=say,
+    )
+    figures = {
+        "machine": machine(),
+        "seed": args.seed,
+        "repeats": args.repeats,
+        "goals": args.goals,
+        "compiled": args.compiled,
+        "rows": [],
+    }
+    file = args.out / f"{args.what}.json"
+    for row in measured(subject, args.sections):
+        figures["rows"].append(row)
+        _write(file, to_json(figures))
+    say(f"figures are in {file}")
+    return Report(success=True, figures=figures, text=tables(figures["rows"]))
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in text.split(",") if name.strip())
+
+
+def _write(file: Path, text: str) -> None:
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text + "\n", encoding="utf-8")
+    except OSError as error:
+        raise ConfigurationError(f"{file}: cannot be written ({error.strerror})") from None

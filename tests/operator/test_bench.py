@@ -1,0 +1,56 @@
+"""``aerial bench``: its contract on the command line."""
+
+import json
+
+import pytest
+
+
+@pytest.fixture(scope="module")
+def benched(aerial_process, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("bench")
+    options = ("--sections", "variants", "--motions", "jump", "--repeats", 1, "--out", folder)
+    return aerial_process("bench", "planner", *options, "--json"), folder
+
+
+def test_bench_measures_every_variant_with_and_without_warm_start(benched):
+    ended, _ = benched
+    assert ended.status == 0
+    rows = ended.figures["rows"]
+    assert [(row["variant"], row["warm_start"]) for row in rows] == [
+        (variant, warm) for variant in ("KD", "AAKD", "AAKD*") for warm in (False, True)
+    ]
+    assert all(row["section"] == "variants" and row["motion"] == "jump" for row in rows)
+    assert all(row["solved"] == 1 and row["total_time_s"]["p50"] > 0 for row in rows)
+
+
+def test_bench_says_what_it_was_measured_on(benched):
+    ended, _ = benched
+    assert ended.figures["machine"].keys() >= {"processor", "cores", "load", "threads", "python", "versions"}
+
+
+def test_bench_leaves_its_figures_in_a_file(benched):
+    ended, folder = benched
+    assert json.loads((folder / "planner.json").read_text()) == ended.figures
+
+
+def test_bench_shows_progress(benched):
+    ended, _ = benched
+    assert "variants of jump: 1 of 1" in ended.errors
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "words"),
+    [
+        (["bench"], 2, "WHAT"),
+        (["bench", "robot"], 2, "planner"),
+        (["bench", "planner", "--sections", "varants"], 2, "did you mean 'variants'"),
+        (["bench", "planner", "--motions", "jmup"], 1, "did you mean 'jump'"),
+        (["bench", "planner", "--repeats", "0"], 1, "expected at least 1, found 0"),
+        (["bench", "planner", "--goals", "-1"], 1, "expected at least 1, found -1"),
+    ],
+)
+def test_what_cannot_be_measured_is_one_sentence(aerial, arguments, status, words):
+    ended = aerial(*arguments)
+    assert ended.status == status
+    assert words in ended.errors
+    assert "Traceback" not in ended.errors
