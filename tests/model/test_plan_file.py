@@ -78,6 +78,34 @@ def test_anything_else_is_no_plan_file(content, robot, tmp_path):
         load_plan(tmp_path / "plan", robot)
 
 
+def test_damage_anywhere_is_one_sentence_or_harmless(plan, robot, tmp_path):
+    path = tmp_path / "plan"
+    save_plan(plan, path)
+    whole, random = path.read_bytes(), np.random.default_rng(0)
+    sentences = []
+    for _ in range(200):
+        damaged = bytearray(whole)
+        damaged[random.integers(len(damaged))] ^= random.integers(1, 256)
+        path.write_bytes(damaged)
+        try:
+            load_plan(path, robot)
+        except InvalidPlanError as error:
+            sentences.append(str(error))
+    assert len(sentences) > 100
+    assert all(sentence.startswith(f"{path}: ") and "\n" not in sentence for sentence in sentences)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("motion", 3.0), ("take_off_time", "soon"), ("q", np.array([["x"]])), ("landing_yaw", np.zeros(2)), ("com", 1.0)],
+)
+def test_an_entry_of_another_kind_is_named(plan, robot, tmp_path, name, value):
+    save_plan(plan, tmp_path / "plan.npz")
+    np.savez(tmp_path / "plan.npz", **{**np.load(tmp_path / "plan.npz"), name: value})
+    with pytest.raises(InvalidPlanError, match=f"plan field {name}: expected"):
+        load_plan(tmp_path / "plan.npz", robot)
+
+
 def test_a_missing_file_is_no_plan_file(robot, tmp_path):
     with pytest.raises(InvalidPlanError, match="not a plan file"):
         load_plan(tmp_path / "plan", robot)

@@ -12,7 +12,7 @@ from aerial_model.robot import Robot, known_robots
 
 PLAN_KEYS = {
     *("motion", "robot", "variant", "warm_start", "solver", "success", "total_time_s", "solve_time_s", "srbm_time_s"),
-    *("iterations", "max_violation", "peak_torque_ratio", "peak_voltage_ratio", "peak_speed_ratio"),
+    *("started_from", "iterations", "max_violation", "peak_torque_ratio", "peak_voltage_ratio", "peak_speed_ratio"),
     *("take_off_time_s", "flight_time_s", "rotation_deg", "landing_position_m", "refusal"),
 }
 SIMULATION_KEYS = {
@@ -47,6 +47,13 @@ def test_plan_saves_the_plan_it_reports(planned):
     ended, file = planned
     plan = load_plan(file, Robot.load("mini_cheetah"))
     assert plan.take_off_time == ended.figures["take_off_time_s"]
+
+
+def test_a_saved_plan_starts_the_next_one(aerial, planned, tmp_path):
+    shutil.copy(planned[1], tmp_path / "forward.npz")
+    ended = aerial("plan", "jump", "--to", "0.35,0,0", "--library", tmp_path)
+    assert "library start" in ended.output
+    assert len(list(tmp_path.iterdir())) == 2
 
 
 def test_plan_tells_a_person_the_same(aerial):

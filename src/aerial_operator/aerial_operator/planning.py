@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+from pathlib import Path
 
 from aerial_model.errors import RefusalError
 from aerial_model.request import MotionRequest
 from aerial_model.robot import Robot
+from aerial_operator.console import say
 from aerial_planner.compiled import default_cache
+from aerial_planner.plan_library import PlanLibrary
 from aerial_planner.planner import Planner
 
 
@@ -17,12 +20,19 @@ def add_planner_arguments(parser: argparse.ArgumentParser) -> None:
     planner = parser.add_argument_group("planner")
     planner.add_argument("--variant", metavar="KD|AAKD|AAKD*", default="AAKD*", help="of its dynamics (default: AAKD*)")
     planner.add_argument("--no-warm-start", action="store_true", help="skip the single-rigid-body stage")
+    planner.add_argument(
+        "--library",
+        metavar="FOLDER",
+        type=Path,
+        help="start from the nearest plan in it, if one is near; add the new one",
+    )
     planner.add_argument("--solver", choices=("fatrop", "ipopt"), default="fatrop", help="(default: fatrop)")
 
 
 def warm_planner(args: argparse.Namespace, robot: Robot, request: MotionRequest) -> Planner:
     """Return a planner whose problems are built: what a user waits for a plan is what a running planner takes."""
-    planner = Planner(robot, solver=args.solver, cache=default_cache())
+    plans = PlanLibrary(args.library, robot, say) if args.library is not None else None
+    planner = Planner(robot, solver=args.solver, cache=default_cache(), plans=plans)
     with contextlib.suppress(RefusalError):  # the plan will raise it again, with its figures
         planner.warm_up(request)
     return planner

@@ -17,11 +17,12 @@ from aerial_model.request import MotionRequest
 from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, Robot
 from aerial_model.state import Estimate
 from aerial_planner.assembly import ActuatorUse, actuator_use, assemble
-from aerial_planner.checks import ACTUATOR_TOLERANCE, check, clearance_deficit
+from aerial_planner.checks import ACTUATOR_TOLERANCE, VIOLATION_TOLERANCE, check, clearance_deficit
 from aerial_planner.collision import CollisionModel
 from aerial_planner.compiled import FunctionLibrary
 from aerial_planner.inverse_kinematics import InverseKinematics
 from aerial_planner.kino_dynamic import KinoDynamic, Variant
+from aerial_planner.plan_library import PlanLibrary
 from aerial_planner.reference import Reference, body_reference
 from aerial_planner.schedule import Motion, Schedule, contact_schedule, load_motion
 from aerial_planner.screen import screen
@@ -48,6 +49,7 @@ class PlanReport:
     robot: str
     variant: str
     warm_start: bool
+    started_from: str  # "library", "srbm" or "reference"; empty if nothing was optimized
     solver: str
     success: bool
     total_time_s: float
@@ -86,6 +88,7 @@ class _Clock:
     solve: float = 0.0
     srbm: float = 0.0
     iterations: int = 0
+    started_from: str = ""  # where the last solve of the kino-dynamic stage began
 
 
 class Planner:
@@ -98,6 +101,8 @@ class Planner:
         cache: folder of compiled functions (see ``compiled``); None: evaluate interpreted ones.
         actuator_tolerance: exact torque, voltage or speed over its limit from which a plan is refused; infinite to see
             what a plan asks for that is not refused for it.
+        plans: made before; the nearest one replaces the single rigid body as start, and new ones are added. With it,
+            equal requests need not give plans equal to the last bit.
     """
 
     def __init__(
@@ -108,9 +113,11 @@ class Planner:
         settings: PlannerSettings | None = None,
         cache: Path | None = None,
         actuator_tolerance: float = ACTUATOR_TOLERANCE,
+        plans: PlanLibrary | None = None,
     ) -> None:
         self.robot = robot
         self.actuator_tolerance = actuator_tolerance
+        self.plans = plans
         self.settings = settings or robot.section("planner", PlannerSettings)
         self._library = FunctionLibrary(cache, robot, self.settings) if cache else None
         self.options = SolverOptions(solver=solver, max_iterations=_ITERATIONS_MAX)
@@ -182,14 +189,15 @@ class Planner:
             schedule = self._schedule(request, motion, least_rise)
             reference = body_reference(schedule, q_start, self.robot, self._model, self._ik, self.settings)
             screen(request, schedule, reference, self.robot)
-            guess = self._guess(request, schedule, reference, progress, clock)
-            take_off, solution = self._optimize(variant, schedule, reference, guess, progress, clock)
+            take_off, solution = self._take_off(request, variant, schedule, reference, progress, clock)
             plan = assemble(request, self.robot, self._model, schedule, reference, take_off)
             use = actuator_use(plan, self.robot)
             check(plan, schedule, solution, use, self.robot, self.actuator_tolerance)
             missing, reason = self._missing_height(plan)
             if missing == 0.0:
                 progress("checked", clock.iterations, solution.max_violation)
+                if self.plans is not None:
+                    self.plans.add(plan)
                 report = self._report(request, clock, plan=plan, solution=solution, use=use)
                 return PlanningResult(plan=plan, report=report, actuator_use=use)
             if clock.iterations > _ITERATIONS_OF_REQUEST:
@@ -210,6 +218,26 @@ class Planner:
             return max(deficit, _TOUCH_RISE), str(touch)
         what = "platform edge" if touch.is_terrain else "self-collision"
         raise RefusalError(RefusalCode.CHECK_FAILED, f"{what}: {touch}")
+
+    def _take_off(
+        self,
+        request: MotionRequest,
+        variant: Variant,
+        schedule: Schedule,
+        reference: Reference,
+        progress: Progress,
+        clock: _Clock,
+    ) -> tuple[TakeOffTrajectory, Solution]:
+        """Return the optimum from the nearest stored plan, or if there is none or it misled, from the usual guess."""
+        stored = self.plans.nearest(schedule, reference) if self.plans is not None and request.warm_start else None
+        if stored is not None:
+            clock.started_from = "library"
+            take_off, solution = self._optimize(variant, schedule, reference, stored, progress, clock)
+            if solution.max_violation <= VIOLATION_TOLERANCE:
+                return take_off, solution
+        guess = self._guess(request, schedule, reference, progress, clock)
+        clock.started_from = "srbm" if request.warm_start else "reference"
+        return self._optimize(variant, schedule, reference, guess, progress, clock)
 
     def _guess(
         self, request: MotionRequest, schedule: Schedule, reference: Reference, progress: Progress, clock: _Clock
@@ -295,6 +323,7 @@ class Planner:
             robot=self.robot.name,
             variant=request.variant,
             warm_start=request.warm_start,
+            started_from=clock.started_from,
             solver=self.options.solver,
             success=plan is not None,
             total_time_s=time.perf_counter() - clock.started,

@@ -13,6 +13,8 @@ from aerial_operator.goal import add_goal_arguments, request_from
 from aerial_operator.planning import add_planner_arguments, warm_planner
 from aerial_planner.planner import PlanReport
 
+_STARTS = {"library": "library", "srbm": "warm", "reference": "cold"}
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add goal, planner options and where to save the plan."""
@@ -59,7 +61,7 @@ def summary(report: PlanReport) -> str:
 
 
 def _times(report: PlanReport) -> str:
-    start = "warm" if report.warm_start else "cold"
+    start = _STARTS.get(report.started_from, "no")
     outcome = "planned" if report.success else "refused"
     return (
         f"{report.motion} of {report.robot}, {report.variant}, {start} start, {report.solver}: {outcome} in "

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from aerial_model.robot import Robot
 from aerial_operator.client import connected
 from aerial_operator.console import Report, say
-from aerial_operator.nodes import NodeProcesses, parameters
+from aerial_operator.nodes import PLANNER, NodeProcesses, parameters
 
 _WATCH_PERIOD = 0.5  # between two looks at the processes [s]
 _PATIENCE = 20.0  # after which a person is told what is missing [s]
@@ -16,6 +17,9 @@ _PATIENCE = 20.0  # after which a person is told what is missing [s]
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what the nodes may be told."""
     parser.add_argument("--noise", choices=("nominal", "off"), default="nominal", help="(default: nominal)")
+    parser.add_argument(
+        "--library", metavar="FOLDER", type=Path, help="of plans that the planner starts from and adds to"
+    )
     parser.add_argument("--lock-step", action="store_true", help="as fast as possible instead of in real time")
 
 
@@ -23,6 +27,8 @@ def run(args: argparse.Namespace) -> Report:
     """Start the nodes, say when they are ready, watch them until told to stop."""
     Robot.load(args.robot)  # a robot that does not load is one sentence here, and three logs there
     told = parameters(args.robot, seed=args.seed, noise=args.noise, real_time=not args.lock_step)
+    if args.library is not None:
+        told[PLANNER.name]["library"] = str(args.library.expanduser().resolve())
     ready, died = False, []
     with NodeProcesses(told) as nodes, connected() as client:
         say("starting simulator, controller and planner; Ctrl-C ends them")

@@ -6,6 +6,7 @@ Every selection gets an answer, whatever it holds, and nothing it holds ends the
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -29,6 +30,7 @@ from aerial_model.state import Estimate
 from aerial_msgs.action import PlanMotion
 from aerial_msgs.msg import MotionPlan, MotionResult, MotionSelection
 from aerial_planner.compiled import default_cache
+from aerial_planner.plan_library import PlanLibrary
 from aerial_planner.planner import Planner
 from aerial_planner.ros.worker import Worker
 from aerial_planner.schedule import known_motions
@@ -42,7 +44,8 @@ class PlannerNode(node.AerialNode):
     """Plans what is selected, from where the robot is believed to stand.
 
     Parameters: ``solver`` (fatrop or ipopt), ``niceness`` of the planning thread (0 to 19), ``warm_up`` (motions whose
-    problems are built on activation: names separated by commas, or ``all``), and those of every node.
+    problems are built on activation: names separated by commas, or ``all``), ``library`` (folder of plans to start from
+    and to add to; empty: none), and those of every node.
     """
 
     def __init__(self, **options: Any) -> None:
@@ -50,11 +53,18 @@ class PlannerNode(node.AerialNode):
         self.declare_parameter("solver", "fatrop")
         self.declare_parameter("niceness", 5)
         self.declare_parameter("warm_up", "all")
+        self.declare_parameter("library", "")
 
     def configure(self) -> None:
         """Load the robot, make the planner, open the interfaces."""
         self._robot = Robot.load(self.get_parameter("robot").value)
-        self._planner = Planner(self._robot, solver=self.get_parameter("solver").value, cache=default_cache())
+        folder = self.get_parameter("library").value
+        self._planner = Planner(
+            self._robot,
+            solver=self.get_parameter("solver").value,
+            cache=default_cache(),
+            plans=PlanLibrary(Path(folder), self._robot, self.get_logger().warning) if folder else None,
+        )
         self._worker = Worker(self.get_parameter("niceness").value, self.get_logger())
         self._active = False
         self._odometry: Odometry | None = None
