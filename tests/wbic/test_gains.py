@@ -8,7 +8,7 @@ import pytest
 
 from aerial_model.errors import ConfigurationError
 from aerial_wbic.controller import Controller
-from aerial_wbic.gains import Feedback
+from aerial_wbic.gains import EstimatorNoise
 
 
 @pytest.mark.parametrize(
@@ -25,10 +25,17 @@ def test_nothing_is_negative(gains, name):
         dataclasses.replace(gains, **{name: -1.0})
 
 
-@pytest.mark.parametrize(("stiffness", "damping"), [(-1.0, 1.0), (1.0, 0.0)])
-def test_feedback_needs_damping(stiffness, damping):
-    with pytest.raises(ValueError, match="damping"):
-        Feedback(stiffness=stiffness, damping=damping)
+@pytest.mark.parametrize(("name", "value"), [("stiffness", -1.0), ("damping", 0.0)])
+def test_feedback_needs_damping(gains, name, value):
+    position = gains.hold.position._replace(**{name: value})
+    with pytest.raises(ValueError, match=rf"hold\.position\.{name} must"):
+        dataclasses.replace(gains, hold=gains.hold._replace(position=position))
+
+
+@pytest.mark.parametrize("name", EstimatorNoise._fields)
+def test_the_noise_assumed_must_be_positive(gains, name):
+    with pytest.raises(ValueError, match=rf"estimator\.{name} must be positive"):
+        dataclasses.replace(gains, estimator=gains.estimator._replace(**{name: 0.0}))
 
 
 def test_a_misspelt_gain_is_named(robot):

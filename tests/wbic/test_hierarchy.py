@@ -32,7 +32,7 @@ def task(random: np.random.Generator, J: np.ndarray) -> Task:
 @given(seeds, st.lists(st.integers(0, 6), min_size=2, max_size=4))
 def test_a_lower_task_never_disturbs_a_higher_one(seed, rows):
     random = np.random.default_rng(seed)
-    M_inv, tasks = inverse_inertia(random), [task(random, orthonormal(random, m)) for m in rows]
+    M_inv, tasks = inverse_inertia(random), tuple(task(random, orthonormal(random, m)) for m in rows)
     before = prioritized(M_inv, tasks[:-1])
     after = prioritized(M_inv, tasks)
     for higher in tasks[:-1]:
@@ -44,7 +44,7 @@ def test_a_lower_task_never_disturbs_a_higher_one(seed, rows):
 def test_tasks_that_fit_together_are_all_met(seed, first, second):
     random = np.random.default_rng(seed)
     J = orthonormal(random, first + second)
-    tasks = [task(random, J[:first]), task(random, J[first:] + random.normal(size=(second, first)) @ J[:first])]
+    tasks = (task(random, J[:first]), task(random, J[first:] + random.normal(size=(second, first)) @ J[:first]))
     vdot, v = prioritized(inverse_inertia(random), tasks)
     for each in tasks:
         np.testing.assert_allclose(each.J @ vdot, each.a, atol=TOLERANCE * max(1, np.abs(vdot).max()))
@@ -57,17 +57,17 @@ def test_a_conflicting_task_gives_way_without_blowing_up(seed):
     above = task(random, orthonormal(random, 5))
     against = Task(J=above.J[:3], a=above.a[:3] + 1.0, xdot=above.xdot[:3] + 1.0)
     M_inv = inverse_inertia(random)
-    vdot, _ = prioritized(M_inv, [above, against])
-    np.testing.assert_allclose(vdot, prioritized(M_inv, [above])[0], atol=TOLERANCE)
+    vdot, _ = prioritized(M_inv, (above, against))
+    np.testing.assert_allclose(vdot, prioritized(M_inv, (above,))[0], atol=TOLERANCE)
 
 
 @given(seeds)
 def test_a_task_with_no_freedom_left_changes_nothing(seed):
     random = np.random.default_rng(seed)
     J = orthonormal(random, NV)
-    above = [task(random, J[:6]), task(random, J[6:])]
+    above = (task(random, J[:6]), task(random, J[6:]))
     M_inv = inverse_inertia(random)
-    vdot, _ = prioritized(M_inv, [*above, task(random, orthonormal(random, 3))])
+    vdot, _ = prioritized(M_inv, (*above, task(random, orthonormal(random, 3))))
     np.testing.assert_array_equal(vdot, prioritized(M_inv, above)[0])
 
 
@@ -76,7 +76,7 @@ def test_a_task_of_lower_rank_does_not_blow_up(seed, rank):
     random = np.random.default_rng(seed)
     M_inv = inverse_inertia(random)
     redundant = task(random, random.normal(size=(5, rank)) @ orthonormal(random, rank))
-    vdot, _ = prioritized(M_inv, [redundant])
+    vdot, _ = prioritized(M_inv, (redundant,))
     assert consistent_inverses(redundant.J, M_inv)[2] <= rank
     assert np.abs(vdot).max() < ACCELERATION_MAX
 
@@ -85,7 +85,7 @@ def test_a_task_of_lower_rank_does_not_blow_up(seed, rank):
 def test_what_no_task_asks_for_has_the_least_kinetic_energy(seed):
     random = np.random.default_rng(seed)
     M_inv, only = inverse_inertia(random), task(random, orthonormal(random, 4))
-    vdot, _ = prioritized(M_inv, [only])
+    vdot, _ = prioritized(M_inv, (only,))
     _, _, Vt = np.linalg.svd(only.J)
     free = Vt[4:].T  # any acceleration that the task does not feel
     np.testing.assert_allclose(free.T @ np.linalg.solve(M_inv, vdot), 0.0, atol=1e-6)
@@ -93,7 +93,7 @@ def test_what_no_task_asks_for_has_the_least_kinetic_energy(seed):
 
 def test_tasks_without_rows_ask_for_nothing():
     empty = Task(J=np.zeros((0, NV)), a=np.zeros(0), xdot=np.zeros(0))
-    vdot, v = prioritized(np.eye(NV), [empty])
+    vdot, v = prioritized(np.eye(NV), (empty,))
     assert not vdot.any()
     assert not v.any()
 

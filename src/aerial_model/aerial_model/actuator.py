@@ -58,7 +58,7 @@ class ActuatorLaw:
 
     def voltage(self, torque: np.ndarray, speed: np.ndarray) -> np.ndarray:
         """Return the motor voltage ``(..., n)`` [V] that gives ``torque`` [N·m] at joint ``speed`` [rad/s]."""
-        return self.volts_per_torque * torque + self.volts_per_speed * speed
+        return voltage_of(torque, speed, self.volts_per_torque, self.volts_per_speed)
 
     def torque_bounds(self, speed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the least and the greatest torque ``(..., n)`` [N·m] available at joint ``speed`` [rad/s].
@@ -81,7 +81,7 @@ class ActuatorLaw:
 
         Coulomb's sign function is smoothed to tanh(q̇ / ``stiction_speed``) so that it can be fed forward.
         """
-        return self.damping * speed + self.dry_friction * np.tanh(speed / stiction_speed)
+        return friction_of(speed, self.damping, self.dry_friction, stiction_speed)
 
     def torque_ratio(self, torque: np.ndarray) -> np.ndarray:
         """Return |τ| / τ_max ``(..., n)``."""
@@ -94,3 +94,18 @@ class ActuatorLaw:
     def speed_ratio(self, speed: np.ndarray) -> np.ndarray:
         """Return |q̇| / no-load speed ``(..., n)``."""
         return np.abs(speed) / self.no_load_speed
+
+
+# The formulas that controllers compile as they stand.
+
+
+def voltage_of(
+    torque: np.ndarray, speed: np.ndarray, volts_per_torque: np.ndarray, volts_per_speed: np.ndarray
+) -> np.ndarray:
+    """Return the motor voltage [V] that gives ``torque`` [N·m] at joint ``speed`` [rad/s]."""
+    return volts_per_torque * torque + volts_per_speed * speed
+
+
+def friction_of(speed: np.ndarray, damping: np.ndarray, dry_friction: np.ndarray, stiction_speed: float) -> np.ndarray:
+    """Return the joint torque [N·m] that friction takes at joint ``speed`` [rad/s], Coulomb's sign smoothed."""
+    return damping * speed + dry_friction * np.tanh(speed / stiction_speed)

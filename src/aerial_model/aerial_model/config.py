@@ -1,4 +1,7 @@
-"""Configuration as data: YAML mappings become frozen dataclasses, and a misspelt key is an error that lists the known ones."""
+"""Configuration as data: YAML mappings become frozen dataclasses or named tuples.
+
+A misspelt key is an error that lists the known ones.
+"""
 
 from __future__ import annotations
 
@@ -59,13 +62,13 @@ def check_keys(mapping: Mapping[str, Any], required: Iterable[str], optional: It
 
 
 def from_mapping(cls: type[T], mapping: Any, where: str) -> T:
-    """Build a (nested) frozen dataclass from a YAML mapping.
+    """Build a (nested) frozen dataclass or named tuple from a YAML mapping.
 
     Fields without a default are required. Numbers become ``float``/``int``, lists of numbers become read-only arrays,
-    mappings become the dataclass the field is annotated with.
+    mappings become the class the field is annotated with.
 
     Args:
-        cls: the dataclass.
+        cls: the dataclass or named tuple.
         mapping: what the YAML holds for it.
         where: file and key path, for error messages.
 
@@ -74,12 +77,8 @@ def from_mapping(cls: type[T], mapping: Any, where: str) -> T:
     """
     if not isinstance(mapping, Mapping):
         raise ConfigurationError(f"{where}: expected a mapping, found {mapping!r}")
-    fields = {field.name: field for field in dataclasses.fields(cls) if field.init}  # type: ignore[arg-type]
-    has_default = {
-        name: field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
-        for name, field in fields.items()
-    }
-    check_keys(mapping, [n for n in fields if not has_default[n]], [n for n in fields if has_default[n]], where)
+    required, optional = _fields(cls)
+    check_keys(mapping, required, optional, where)
     hints = get_type_hints(cls)
     try:
         return cls(**{key: _convert(hints[key], value, f"{where}: {key}") for key, value in mapping.items()})
@@ -87,12 +86,22 @@ def from_mapping(cls: type[T], mapping: Any, where: str) -> T:
         raise ConfigurationError(f"{where}: {error}") from None
 
 
+def _fields(cls: type) -> tuple[list[str], list[str]]:
+    """Return the names of the fields without and with a default."""
+    if not dataclasses.is_dataclass(cls):
+        return [name for name in cls._fields if name not in cls._field_defaults], list(cls._field_defaults)
+    fields = [field for field in dataclasses.fields(cls) if field.init]
+    missing = dataclasses.MISSING
+    optional = [f.name for f in fields if f.default is not missing or f.default_factory is not missing]
+    return [field.name for field in fields if field.name not in optional], optional
+
+
 def _convert(kind: Any, value: Any, where: str) -> Any:
     if isinstance(kind, types.UnionType):  # X | None
         if value is None:
             return None
         kind = next(member for member in get_args(kind) if member is not types.NoneType)
-    if dataclasses.is_dataclass(kind) and isinstance(kind, type):
+    if isinstance(kind, type) and (dataclasses.is_dataclass(kind) or hasattr(kind, "_fields")):
         return from_mapping(kind, value, where)
     if kind is np.ndarray:
         return frozen_array(value, where)

@@ -7,7 +7,10 @@ support on the ground, x along the heading, z up) until ``placed`` expresses the
 from __future__ import annotations
 
 import dataclasses
+from bisect import bisect_right
 from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +22,7 @@ from aerial_model.terrain import Terrain
 QUATERNION_TOLERANCE = 1e-6  # deviation of the norm from 1
 
 
-@dataclass(frozen=True, kw_only=True)
-class Target:
+class Target(NamedTuple):
     """A plan sampled at one time, in the plan's frame."""
 
     q: np.ndarray  # (nq,)
@@ -134,27 +136,46 @@ class Plan:
 
     def sample(self, time: float) -> Target:
         """Return the plan at ``time`` [s], held at its ends; states are interpolated between knots, forces held."""
-        k = int(np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.time) - 2))
-        dt = self.time[k + 1] - self.time[k]
-        s = float(np.clip((time - self.time[k]) / dt, 0.0, 1.0))
-        q = (1 - s) * self.q[k] + s * self.q[k + 1]
+        k = self.interval(time)
+        begin, dt = self._intervals[k]
+        s = min(max((time - begin) / dt, 0.0), 1.0)
+        knots, slopes = self._rows
+        row, slope = knots[k] + (s * dt) * slopes[k], slopes[k]
+        nq, nv = self.q.shape[1], self.v.shape[1]
+        com, rest = nq + nv, nq + nv + 3
+        q = row[:nq]
         q[BASE_ORIENTATION] = rotation.slerp(self.q[k, BASE_ORIENTATION], self.q[k + 1, BASE_ORIENTATION], s)
-
-        def between(rows: np.ndarray) -> np.ndarray:
-            return (1 - s) * rows[k] + s * rows[k + 1]
-
         return Target(
             q=q,
-            v=between(self.v),
-            com=between(self.com),
-            com_velocity=between(self.com_velocity),
-            com_acceleration=(self.com_velocity[k + 1] - self.com_velocity[k]) / dt,
-            angular_momentum=between(self.angular_momentum),
-            angular_momentum_rate=(self.angular_momentum[k + 1] - self.angular_momentum[k]) / dt,
-            vdot=(self.v[k + 1] - self.v[k]) / dt,
+            v=row[nq:com],
+            com=row[com:rest],
+            com_velocity=row[rest : rest + 3],
+            com_acceleration=slope[rest : rest + 3],
+            angular_momentum=row[rest + 3 :],
+            angular_momentum_rate=slope[rest + 3 :],
+            vdot=slope[nq:com],
             force=self.force[k],
             contact=self.contact[k],
         )
+
+    def interval(self, time: float) -> int:
+        """Return the number k of the interval [t_k, t_k+1) that ``time`` [s] is in; before the first and after the last: these."""
+        return min(max(bisect_right(self._begins, time) - 1, 0), len(self._intervals) - 1)
+
+    @cached_property
+    def _intervals(self) -> list[tuple[float, float]]:
+        """Begin and duration of every interval [s]."""
+        return list(zip(self.time[:-1].tolist(), np.diff(self.time).tolist(), strict=True))
+
+    @cached_property
+    def _begins(self) -> list[float]:
+        return [begin for begin, _ in self._intervals]
+
+    @cached_property
+    def _rows(self) -> tuple[np.ndarray, np.ndarray]:
+        """All that is interpolated, one row a knot, and its slope over the interval that follows."""
+        knots = np.hstack([self.q, self.v, self.com, self.com_velocity, self.angular_momentum])
+        return knots, np.diff(knots, axis=0) / np.diff(self.time)[:, None]
 
     @property
     def landing_pose(self) -> np.ndarray:

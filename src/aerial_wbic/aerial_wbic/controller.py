@@ -16,18 +16,16 @@ from aerial_model import rotation
 from aerial_model.errors import RefusalCode, RefusalError
 from aerial_model.kinematics import Configuration, Kinematics
 from aerial_model.plan import Plan
-from aerial_model.robot import BASE_ORIENTATION, Robot
+from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, JOINT_POSITION, Robot
 from aerial_model.state import Command, Estimate, Measurement
 from aerial_wbic.acceptance import check_start
-from aerial_wbic.consistency import consistent
 from aerial_wbic.drive import Drive
 from aerial_wbic.estimator import Estimator
 from aerial_wbic.gains import ControllerGains
-from aerial_wbic.hierarchy import prioritized
 from aerial_wbic.phase import FOLLOWING, Phase, Phases
 from aerial_wbic.qp import ForceOptimization
-from aerial_wbic.target import PostureTarget, WholeBodyTarget
-from aerial_wbic.tasks import Limbs, attitude_error, prioritized_tasks
+from aerial_wbic.target import GRAVITY, Fold, PostureTarget, WholeBodyTarget
+from aerial_wbic.tasks import Limbs, attitude_error, command
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,6 +63,8 @@ class Controller:
         self._estimator = Estimator(robot, self._gains.estimator)
         self._home_height = _home_height(robot, self._kinematics)
         self.reset()
+        self._rehearse()
+        self.reset()
 
     def reset(self) -> None:
         """Forget estimate, plan, stop and counters; stand from the next measurement on."""
@@ -87,7 +87,8 @@ class Controller:
         self._now = (state, target)
         if not isinstance(target, WholeBodyTarget):
             return self._drive.resting(target, measurement)
-        vdot_cmd, v_ref = prioritized(state.M_inv, prioritized_tasks(state, target, self._limbs, self._gains))
+        gains, swinging = self._gains, self._limbs.swinging(target.contact)
+        vdot_cmd, v_ref = command(state, target, swinging, gains.swing_joint, gains.angular_momentum_damping)
         solution = self._qp.solve(state, vdot_cmd, target.force, target.contact)
         self._fallback_ticks += not solution.solved
         return self._drive.command(state, solution, v_ref, measurement)
@@ -106,7 +107,6 @@ class Controller:
             raise RefusalError(RefusalCode.NOT_STANDING, f"the robot does not stand; its phase is {self.phase.name}")
         check_start(plan, self.estimate, self.robot, self._gains)
         origin, self._start_heading = self.robot.start_frame(self.estimate.q)
-        plan = consistent(plan, Kinematics(self.robot), self._limbs)
         self._phases.follow(plan.placed(origin, self._start_heading))
 
     def abort(self) -> None:
@@ -162,6 +162,27 @@ class Controller:
             fallback_ticks=self._fallback_ticks,
             **(self._errors() if self.phase in FOLLOWING and self._phases.time_in_plan > 0 else {}),
         )
+
+    def _rehearse(self) -> None:
+        """Stand for two ticks, report and begin to fold the legs, so that whatever must be compiled is."""
+        q = self.robot.standing_configuration()
+        still, joints = np.zeros(3), np.zeros(self.robot.n_joints)
+        for tick in range(2):
+            measurement = Measurement(
+                time=0.002 * tick,
+                sequence=tick,
+                orientation=q[BASE_ORIENTATION].copy(),
+                angular_velocity=still,
+                linear_acceleration=np.array([0.0, 0.0, GRAVITY]),
+                joint_position=q[JOINT_POSITION].copy(),
+                joint_velocity=joints,
+                joint_torque=joints,
+                localization=q[BASE_POSITION].copy(),
+            )
+            self.step(measurement)
+        state, target = self._now
+        attitude_error(target.body.orientation, state.base_orientation)
+        Fold(state, 0.0, rate=1.0, pose=joints).at(0.0, state)
 
     def _errors(self) -> dict[str, np.ndarray]:
         state, target = self._now

@@ -2,14 +2,38 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from aerial_model import actuator
+from aerial_model.actuator import ActuatorLaw
 from aerial_model.kinematics import Configuration
 from aerial_model.robot import JOINT_VELOCITY, Robot
 from aerial_model.state import Command, Measurement
+from aerial_wbic.compiled import compiled
 from aerial_wbic.gains import ControllerGains
 from aerial_wbic.qp import Solution
 from aerial_wbic.target import PostureTarget
+
+_friction_of = compiled(actuator.friction_of)
+_voltage_of = compiled(actuator.voltage_of)
+
+
+class _Law(NamedTuple):
+    """The actuator law's arrays ``(n,)`` that a tick needs, and the width of the friction's sign change [rad/s]."""
+
+    torque_max: np.ndarray
+    bus_voltage: np.ndarray
+    volts_per_torque: np.ndarray
+    volts_per_speed: np.ndarray
+    damping: np.ndarray
+    dry_friction: np.ndarray
+    stiction_speed: float
+
+    @classmethod
+    def of(cls, law: ActuatorLaw, stiction_speed: float) -> _Law:
+        return cls(*(np.array(getattr(law, name)) for name in cls._fields[:-1]), stiction_speed)
 
 
 class Drive:
@@ -20,8 +44,7 @@ class Drive:
     """
 
     def __init__(self, robot: Robot, gains: ControllerGains) -> None:
-        self._law = robot.actuators
-        self._stiction_speed = gains.stiction_speed
+        self._law = _Law.of(robot.actuators, gains.stiction_speed)
         n = robot.n_joints
         self._zeros = np.zeros(n)
         self._joint_damping = np.full(n, gains.joint_damping)
@@ -42,10 +65,13 @@ class Drive:
             measurement: that is answered.
         """
         velocity = v_ref[JOINT_VELOCITY]
-        torque = inverse_dynamics(state, solution) + self._law.friction(velocity, self._stiction_speed)
-        if not np.isfinite(torque).all():
+        torque, saturated = _torque(
+            state, solution, velocity, measurement.joint_velocity, self._joint_damping, self._law
+        )
+        if saturated < 0:
             return self.resting(None, measurement)
-        command = Command(
+        self.saturated_ticks += saturated
+        return Command(
             torque=torque,
             position=measurement.joint_position,
             velocity=velocity,
@@ -54,8 +80,6 @@ class Drive:
             state_time=measurement.time,
             state_sequence=measurement.sequence,
         )
-        self._count(command, measurement)
-        return command
 
     def resting(self, posture: PostureTarget | None, measurement: Measurement) -> Command:
         """Return the command of a robot that does not stand: joints go to a posture, or only resist motion."""
@@ -69,14 +93,38 @@ class Drive:
             state_sequence=measurement.sequence,
         )
 
-    def _count(self, command: Command, measurement: Measurement) -> None:
-        speed = measurement.joint_velocity
-        torque = command.requested_torque(measurement.joint_position, speed)
-        if (self._law.torque_ratio(torque) > 1).any() or (self._law.voltage_ratio(torque, speed) > 1).any():
-            self.saturated_ticks += 1
+
+@compiled
+def _torque(
+    state: Configuration,
+    solution: Solution,
+    velocity: np.ndarray,
+    measured_velocity: np.ndarray,
+    joint_damping: np.ndarray,
+    law: _Law,
+) -> tuple[np.ndarray, int]:
+    """Return the feed-forward torques ``(n,)`` [N·m], and whether the boards will be asked for too much: 1, 0.
+
+    It is −1 if a torque is not finite.
+    """
+    torque = inverse_dynamics(state, solution)
+    torque += _friction_of(velocity, law.damping, law.dry_friction, law.stiction_speed)
+    requested = torque + joint_damping * (velocity - measured_velocity)
+    voltage = _voltage_of(requested, measured_velocity, law.volts_per_torque, law.volts_per_speed)
+    saturated = 0
+    for j in range(len(torque)):
+        if not np.isfinite(torque[j]):
+            return torque, -1
+        if abs(requested[j]) > law.torque_max[j] or abs(voltage[j]) > law.bus_voltage[j]:
+            saturated = 1
+    return torque, saturated
 
 
+@compiled
 def inverse_dynamics(state: Configuration, solution: Solution) -> np.ndarray:
     """Return the joint torques ``(n,)`` [N·m], the joint rows of H q̈ + C q̇ + G − Σ J_c,iᵀ f_i, thesis (2.2)."""
-    J_joints = state.J_contacts[:, :, JOINT_VELOCITY].reshape(solution.force.size, -1)  # (3 n_c, n)
-    return state.M[JOINT_VELOCITY] @ solution.vdot + state.nle[JOINT_VELOCITY] - solution.force.ravel() @ J_joints
+    torque = state.M[JOINT_VELOCITY] @ solution.vdot + state.nle[JOINT_VELOCITY]
+    for i in range(len(solution.force)):
+        for k in range(3):
+            torque -= solution.force[i, k] * state.J_contacts[i, k, JOINT_VELOCITY]
+    return torque

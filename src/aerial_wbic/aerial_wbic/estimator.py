@@ -18,19 +18,55 @@ moment, every point that the schedule has just put on the ground.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import pinocchio as pin
 
-from aerial_model import rotation
-from aerial_model.robot import BASE_ANGULAR, BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY, Robot
+from aerial_model.robot import (
+    BASE_ANGULAR,
+    BASE_LINEAR,
+    BASE_ORIENTATION,
+    BASE_POSITION,
+    JOINT_POSITION,
+    JOINT_VELOCITY,
+    Robot,
+)
 from aerial_model.state import Estimate, Measurement
+from aerial_wbic.compiled import (
+    cholesky,
+    cholesky_solve,
+    compiled,
+    exp_of,
+    matrix_of,
+    product_of,
+    quaternion,
+    vector,
+)
 from aerial_wbic.gains import EstimatorNoise
 from aerial_wbic.target import GRAVITY
 
-P, V = 0, 1  # rows of X
-FEET = slice(2, None)
+P, V, FEET = 0, 1, 2  # rows of X; the contact points fill it from FEET on
 _INSTANT = 1e-3  # [s] less than a period
 _GATE = 4.0  # squared disagreement, in variances, from which a point is believed less
+
+
+class Belief(NamedTuple):
+    """What the filter believes; its arrays change in place."""
+
+    orientation: np.ndarray  # of B (4,)
+    X: np.ndarray  # (2 + n_c, 3)
+    P: np.ndarray  # (2 + n_c, 2 + n_c)
+    roll: np.ndarray  # u_i of the loaded points, else zero (n_c, 3) [m/s]
+    loaded_since: np.ndarray  # (n_c,) [s]
+
+
+class Legs(NamedTuple):
+    """Forward kinematics in W's axes, from the base's centre."""
+
+    offset: np.ndarray  # R p_i (n_c, 3) [m]
+    twist: np.ndarray  # of the points' links at the points, linear R (ω × p_i + ṗ_i) first (n_c, 6) [m/s, rad/s]
+    radius: np.ndarray  # of the contact spheres (n_c,) [m]
 
 
 class Estimator:
@@ -47,7 +83,6 @@ class Estimator:
         self._data = robot.model.createData()
         self._q = np.zeros(robot.model.nq)  # base at the origin
         self._v = np.zeros(robot.model.nv)
-        self._rows_of: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}  # by contacts
         self._radius = np.array([point.radius for point in robot.contact_points])  # (n_c,) [m]
         self.reset()
 
@@ -58,12 +93,12 @@ class Estimator:
     @property
     def position_variance(self) -> float:
         """Of the base position along any axis of W [m²]."""
-        return float(self._P[P, P])
+        return float(self._belief.P[P, P])
 
     @property
     def velocity_variance(self) -> float:
         """Of the base velocity along any axis of W [m²/s²]."""
-        return float(self._P[V, V])
+        return float(self._belief.P[V, V])
 
     def update(self, measurement: Measurement, contact: np.ndarray) -> Estimate:
         """Return the estimate at the measurement's time.
@@ -73,147 +108,192 @@ class Estimator:
             contact: points the schedule has on the ground ``(n_c,)`` bool.
         """
         if self._time is None:
-            self._begin(measurement)
+            self._belief = self._begin(measurement)
         else:
-            self._predict(measurement)
-        self._loaded_since[~contact] = measurement.time
-        offset, offset_velocity, roll = self._forward_kinematics(measurement)
-        self._correct(offset, offset_velocity, roll, contact)
-        if measurement.localization is not None:
-            self._correct_position(measurement.localization)
-        return self._estimate(measurement)
-
-    def _begin(self, measurement: Measurement) -> None:
-        self._orientation = measurement.orientation
-        offset, _, roll = self._forward_kinematics(measurement)
-        n_c = len(offset)
-        self._X = np.zeros((2 + n_c, 3))
-        self._X[P] = [0.0, 0.0, self._radius.mean()] - offset.mean(axis=0)
-        self._P = np.diag([0.0, self._noise.foot_velocity**2, *np.zeros(n_c)])
-        self._feet = np.arange(2, 2 + n_c)
-        self._loaded_since = np.full(n_c, -np.inf)  # a robot that is switched on stands firmly
-        self._roll = roll
-        for i in range(n_c):
-            self._anchor(i, offset[i])
-        self._remember(measurement)
-
-    def _predict(self, measurement: Measurement) -> None:
-        dt = measurement.time - self._time
-        half_turn = rotation.exp((measurement.angular_velocity + self._gyro) * dt / 4)
-        midway = rotation.multiply(self._orientation, half_turn)
-        # The accelerometer reports the mean over the interval: it acts at the attitude half-way.
-        a = rotation.matrix(midway) @ measurement.linear_acceleration + GRAVITY
-        pull = min(dt / self._noise.attitude_time, 1.0)
-        self._orientation = _drawn(rotation.multiply(midway, half_turn), measurement.orientation, pull)
-        X, P_, noise = self._X, self._P, self._noise
-        X[P] += X[V] * dt + a * dt**2 / 2
-        X[V] += a * dt
-        X[FEET] += self._roll * dt
-        P_[P] += dt * P_[V]  # F P Fᵀ
-        P_[:, P] += dt * P_[:, V]
-        push = noise.acceleration**2 * dt**2
-        P_[P, P] += push * dt**2 / 4
-        P_[P, V] += push * dt / 2
-        P_[V, P] += push * dt / 2
-        P_[V, V] += push
-        P_[self._feet, self._feet] += noise.foot_drift**2 * dt
-        self._remember(measurement)
-
-    def _remember(self, measurement: Measurement) -> None:
+            _predict(
+                self._belief,
+                measurement.time - self._time,
+                self._gyro,
+                measurement.angular_velocity,
+                measurement.linear_acceleration,
+                measurement.orientation,
+                self._noise,
+            )
         self._time = measurement.time
         self._gyro = measurement.angular_velocity
-
-    def _forward_kinematics(self, measurement: Measurement) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return R p_i, R (ω × p_i + ṗ_i) and u_i in W's axes, ``(n_c, 3)`` each.
-
-        A sphere that rolls without slip on level ground has its centre moving at ω_i × (0, 0, radius), with ω_i the
-        angular velocity of its link: at take-off 2 cm/s.
-        """
-        q, v = self._q, self._v
-        q[BASE_ORIENTATION] = self._orientation
+        if measurement.localization is not None:
+            _correct_position(self._belief, measurement.localization, self._noise)
+        q, v = np.empty_like(self._q), np.empty_like(self._v)
         q[JOINT_POSITION] = measurement.joint_position
         v[BASE_ANGULAR] = measurement.angular_velocity
         v[JOINT_VELOCITY] = measurement.joint_velocity
-        model, data = self._robot.model, self._data
-        pin.forwardKinematics(model, data, q, v)
-        frames = self._robot.contact_frames
-        offset = np.array([pin.updateFramePlacement(model, data, frame).translation for frame in frames])
-        axes = pin.LOCAL_WORLD_ALIGNED
-        twist = np.array([pin.getFrameVelocity(model, data, frame, axes).vector for frame in frames])  # (n_c, 6)
-        roll = np.zeros_like(offset)
-        roll[:, 0], roll[:, 1] = twist[:, 4] * self._radius, -twist[:, 3] * self._radius
-        return offset, twist[:, :3], roll
-
-    def _correct(self, offset: np.ndarray, offset_velocity: np.ndarray, roll: np.ndarray, contact: np.ndarray) -> None:
-        X, noise = self._X, self._noise
-        self._roll = roll * contact[:, None]
-        loaded, H = self._rows(contact)
-        if not len(loaded):
-            return
-        slip = (roll - offset_velocity)[loaded] - X[V]  # innovation of u_i = v + R (ω × p_i + ṗ_i)
-        distrust = self._distrust(loaded, slip)
-        for i in loaded[distrust > 1]:
-            self._anchor(i, offset[i])
-        miss = X[FEET][loaded] - offset[loaded] - X[P]  # innovation of 0 = p + R p_i − c_i
-        # The points' velocities measure the same v: their mean, weighted by trust, stands for all.
-        trust = 1 / distrust
-        weights = trust / trust.sum()
-        variance = np.append(distrust * noise.foot_position**2, noise.foot_velocity**2 / trust.sum())
-        self._apply(H, np.concatenate([miss, [weights @ slip]]), variance)
-
-    def _rows(self, contact: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the indices of the loaded points ``(n,)`` and their measurement rows ``(n + 1, 2 + n_c)``."""
-        key = contact.tobytes()
-        if key not in self._rows_of:
-            loaded = np.flatnonzero(contact)
-            n = len(loaded)
-            H = np.zeros((n + 1, 2 + len(contact)))
-            H[:n, P] = 1.0
-            H[np.arange(n), 2 + loaded] = -1.0
-            H[n, V] = 1.0
-            self._rows_of[key] = loaded, H
-        return self._rows_of[key]
-
-    def _distrust(self, loaded: np.ndarray, slip: np.ndarray) -> np.ndarray:
-        """Return the factors ``(n,)`` by which loaded points' variances are larger than in a firm stance.
-
-        Large just after the scheduled touchdown, which may not have happened yet, and for points that slip.
-        """
-        variance = self._P[V, V] + self._noise.foot_velocity**2
-        slipping = np.sum(slip**2, axis=1) / (3 * _GATE * variance)
-        age = np.maximum(self._time - self._loaded_since[loaded], _INSTANT)
-        return np.maximum(1.0, slipping) * np.maximum(1.0, self._noise.touchdown_time / age) ** 2
-
-    def _correct_position(self, position: np.ndarray) -> None:
-        H = np.zeros((1, len(self._X)))
-        H[0, P] = 1.0
-        self._apply(H, (position - self._X[P])[None], np.array([self._noise.localization**2]))
-
-    def _apply(self, H: np.ndarray, innovation: np.ndarray, variance: np.ndarray) -> None:
-        """Kalman update with measurement rows H ``(m, 2 + n_c)``, innovations ``(m, 3)`` and variances ``(m,)``."""
-        PHt = self._P @ H.T
-        S = H @ PHt + np.diag(variance)
-        K = np.linalg.solve(S, PHt.T).T
-        self._X += K @ innovation
-        P_ = self._P - K @ PHt.T
-        self._P = (P_ + P_.T) / 2
-
-    def _anchor(self, i: int, offset: np.ndarray) -> None:
-        """Take contact point i to rest where forward kinematics has it: c_i = p + R p_i, as uncertain as p and p_i."""
-        row = 2 + i
-        self._X[row] = self._X[P] + offset
-        self._P[row, :] = self._P[P, :]
-        self._P[:, row] = self._P[:, P]
-        self._P[row, row] = self._P[P, P] + self._noise.foot_position**2
-
-    def _estimate(self, measurement: Measurement) -> Estimate:
-        R = rotation.matrix(self._orientation)
-        q = np.concatenate([self._X[P], self._orientation, measurement.joint_position])
-        v = np.concatenate([R.T @ self._X[V], measurement.angular_velocity, measurement.joint_velocity])
+        _correct(self._belief, self._legs(measurement), contact, measurement.time, self._noise, q, v)
         return Estimate(time=measurement.time, q=q, v=v)
 
+    def _begin(self, measurement: Measurement) -> Belief:
+        n_c = len(self._radius)
+        belief = Belief(
+            orientation=np.array(measurement.orientation, dtype=float),
+            X=np.zeros((FEET + n_c, 3)),
+            P=np.zeros((FEET + n_c, FEET + n_c)),
+            roll=np.zeros((n_c, 3)),
+            loaded_since=np.full(n_c, -np.inf),  # a robot that is switched on stands firmly
+        )
+        self._belief = belief
+        offset = self._legs(measurement).offset
+        belief.X[P] = [0.0, 0.0, self._radius.mean()] - offset.mean(axis=0)
+        belief.P[V, V] = self._noise.foot_velocity**2
+        for i in range(n_c):
+            _anchor(belief, i, offset[i], self._noise)
+        return belief
 
-def _drawn(q: np.ndarray, towards: np.ndarray, share: float) -> np.ndarray:
-    """Return attitude ``q`` ``(4,)`` drawn to one close by, by ``share`` of the way."""
-    mixed = q + share * (np.copysign(1.0, q @ towards) * towards - q)
-    return mixed / np.sqrt(mixed @ mixed)
+    def _legs(self, measurement: Measurement) -> Legs:
+        q, v = self._q, self._v
+        q[BASE_ORIENTATION] = self._belief.orientation
+        q[JOINT_POSITION] = measurement.joint_position
+        v[BASE_ANGULAR] = measurement.angular_velocity
+        v[JOINT_VELOCITY] = measurement.joint_velocity
+        model, data, frames = self._robot.model, self._data, self._robot.contact_frames
+        pin.forwardKinematics(model, data, q, v)
+        axes = pin.LOCAL_WORLD_ALIGNED
+        return Legs(
+            offset=np.array([pin.updateFramePlacement(model, data, frame).translation for frame in frames]),
+            twist=np.array([pin.getFrameVelocity(model, data, frame, axes).vector for frame in frames]),
+            radius=self._radius,
+        )
+
+
+@compiled
+def _predict(
+    belief: Belief,
+    dt: float,
+    gyro_before: np.ndarray,
+    gyro: np.ndarray,
+    specific_force: np.ndarray,
+    reported: np.ndarray,
+    noise: EstimatorNoise,
+) -> None:
+    """Carry the belief on by ``dt`` [s]; ``reported`` is the inertial unit's attitude."""
+    half_turn = exp_of(vector((gyro_before + gyro) * (dt / 4)))
+    midway = product_of(quaternion(belief.orientation), half_turn)
+    # The accelerometer reports the mean over the interval: it acts at the attitude half-way.
+    a = np.array(matrix_of(midway)) @ specific_force
+    a[2] -= GRAVITY
+    belief.orientation[:] = product_of(midway, half_turn)
+    _draw(belief.orientation, reported, min(dt / noise.attitude_time, 1.0))
+    X, cov = belief.X, belief.P
+    X[P] += X[V] * dt + a * dt**2 / 2
+    X[V] += a * dt
+    X[FEET:] += belief.roll * dt
+    cov[P] += dt * cov[V]  # F P Fᵀ
+    cov[:, P] += dt * cov[:, V]
+    push = noise.acceleration**2 * dt**2
+    cov[P, P] += push * dt**2 / 4
+    cov[P, V] += push * dt / 2
+    cov[V, P] += push * dt / 2
+    cov[V, V] += push
+    for i in range(FEET, len(X)):
+        cov[i, i] += noise.foot_drift**2 * dt
+
+
+@compiled
+def _draw(orientation: np.ndarray, towards: np.ndarray, share: float) -> None:
+    """Draw an attitude ``(4,)`` to one close by, by ``share`` of the way."""
+    orientation += share * (np.copysign(1.0, orientation @ towards) * towards - orientation)
+    orientation /= np.sqrt(orientation @ orientation)
+
+
+@compiled
+def _correct(
+    belief: Belief,
+    legs: Legs,
+    contact: np.ndarray,
+    time: float,
+    noise: EstimatorNoise,
+    q: np.ndarray,
+    v: np.ndarray,
+) -> None:
+    """Let the loaded points measure; write the pose of the base into q ``(nq,)``, its linear velocity into v ``(nv,)``."""
+    _correct_by_legs(belief, legs, contact, time, noise)
+    q[BASE_POSITION] = belief.X[P]
+    q[BASE_ORIENTATION] = belief.orientation
+    v[BASE_LINEAR] = belief.X[V] @ np.array(matrix_of(quaternion(belief.orientation)))
+
+
+@compiled
+def _correct_by_legs(belief: Belief, legs: Legs, contact: np.ndarray, time: float, noise: EstimatorNoise) -> None:
+    X = belief.X
+    loaded = np.flatnonzero(contact)
+    n = len(loaded)
+    belief.roll[:] = 0.0
+    belief.loaded_since[~contact] = time
+    if n == 0:
+        return
+    slip = np.empty((n, 3))  # innovation of u_i = v + R (ω × p_i + ṗ_i)
+    variance = np.empty(n + 1)
+    for row, i in enumerate(loaded):
+        # A sphere that rolls without slip on level ground has its centre moving at ω × (0, 0, radius).
+        belief.roll[i, 0] = legs.twist[i, 4] * legs.radius[i]
+        belief.roll[i, 1] = -legs.twist[i, 3] * legs.radius[i]
+        slip[row] = belief.roll[i] - legs.twist[i, :3] - X[V]
+        distrust = _distrust(belief, i, slip[row], time, noise)
+        if distrust > 1.0:
+            _anchor(belief, i, legs.offset[i], noise)
+        variance[row] = distrust
+    # The points' velocities measure the same v: their mean, weighted by trust, stands for all.
+    trust = 1.0 / variance[:n]
+    H, innovation = np.zeros((n + 1, len(X))), np.empty((n + 1, 3))
+    H[:n, P] = 1.0
+    H[n, V] = 1.0
+    for row, i in enumerate(loaded):
+        H[row, FEET + i] = -1.0
+        innovation[row] = X[FEET + i] - legs.offset[i] - X[P]  # of 0 = p + R p_i − c_i
+    innovation[n] = trust @ slip / trust.sum()
+    variance[:n] *= noise.foot_position**2
+    variance[n] = noise.foot_velocity**2 / trust.sum()
+    _apply(belief, H, innovation, variance)
+
+
+@compiled
+def _distrust(belief: Belief, i: int, slip: np.ndarray, time: float, noise: EstimatorNoise) -> float:
+    """Return the factor by which the variance of loaded point i is larger than in a firm stance.
+
+    Large just after the scheduled touchdown, which may not have happened yet, and for a point that slips.
+    """
+    variance = belief.P[V, V] + noise.foot_velocity**2
+    slipping = (slip @ slip) / (3 * _GATE * variance)
+    age = max(time - belief.loaded_since[i], _INSTANT)
+    return max(1.0, slipping) * max(1.0, noise.touchdown_time / age) ** 2
+
+
+@compiled
+def _correct_position(belief: Belief, position: np.ndarray, noise: EstimatorNoise) -> None:
+    H, innovation = np.zeros((1, len(belief.X))), np.empty((1, 3))
+    H[0, P] = 1.0
+    innovation[0] = position - belief.X[P]
+    _apply(belief, H, innovation, np.array([noise.localization**2]))
+
+
+@compiled
+def _apply(belief: Belief, H: np.ndarray, innovation: np.ndarray, variance: np.ndarray) -> None:
+    """Kalman update with measurement rows H ``(m, 2 + n_c)``, innovations ``(m, 3)`` and variances ``(m,)``."""
+    HP = H @ belief.P
+    S = HP @ H.T
+    for i in range(len(variance)):
+        S[i, i] += variance[i]
+    cholesky(S, S)
+    gain = HP.copy()
+    cholesky_solve(S, gain)  # Kᵀ
+    belief.X[:] += gain.T @ innovation
+    left = belief.P - gain.T @ HP
+    belief.P[:] = (left + left.T) / 2
+
+
+@compiled
+def _anchor(belief: Belief, i: int, offset: np.ndarray, noise: EstimatorNoise) -> None:
+    """Take contact point i to rest where forward kinematics has it: c_i = p + R p_i, as uncertain as p and p_i."""
+    row = FEET + i
+    belief.X[row] = belief.X[P] + offset
+    belief.P[row, :] = belief.P[P, :]
+    belief.P[:, row] = belief.P[:, P]
+    belief.P[row, row] = belief.P[P, P] + noise.foot_position**2

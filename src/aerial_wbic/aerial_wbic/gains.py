@@ -2,36 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
 
 
-@dataclass(frozen=True, kw_only=True)
-class Feedback:
+class Feedback(NamedTuple):
     """Gains of one task, thesis (3.22)."""
 
     stiffness: float  # K_p [1/s²]
     damping: float  # K_d [1/s]
 
-    def __post_init__(self) -> None:
-        if not (self.stiffness >= 0 and self.damping > 0):
-            raise ValueError(f"stiffness must not be negative and damping must be positive, found {self}")
 
-    @property
-    def rate(self) -> float:
-        """K_p / K_d, the rate at which the feedback closes a gap [1/s]."""
-        return self.stiffness / self.damping
-
-
-@dataclass(frozen=True, kw_only=True)
-class BodyGains:
+class BodyGains(NamedTuple):
     """Gains of the floating base task, (3.27)."""
 
     position: Feedback
     attitude: Feedback
 
 
-@dataclass(frozen=True, kw_only=True)
-class EstimatorNoise:
+class EstimatorNoise(NamedTuple):
     """What the estimator assumes about its sources; standard deviations."""
 
     acceleration: float  # of the measured base acceleration, per sample [m/s²]
@@ -41,11 +31,6 @@ class EstimatorNoise:
     touchdown_time: float  # after a scheduled touchdown for which contact points are believed less [s]
     localization: float  # of a measured base position [m]
     attitude_time: float  # time constant that draws the integrated gyro to the reported attitude [s]
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            if not getattr(self, field.name) > 0:
-                raise ValueError(f"{field.name} must be positive, found {getattr(self, field.name)}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,22 +59,21 @@ class ControllerGains:
     estimator: EstimatorNoise
 
     def __post_init__(self) -> None:
-        _check_not_negative(self)
-        for name in (
-            "weight_base",
-            "weight_force",
-            "stiction_speed",
-            "settling_rate",
-            "landing_depth",
-            "landing_turn",
-            "lying_rate",
-        ):
-            if getattr(self, name) == 0:
-                raise ValueError(f"{name} must be positive, found 0")
+        for path, value in _numbers(self):
+            may_be_zero = path.split(".")[-1] in _MAY_BE_ZERO
+            if value < 0 or (value == 0 and not may_be_zero):
+                raise ValueError(f"{path} must {'not be negative' if may_be_zero else 'be positive'}, found {value}")
 
 
-def _check_not_negative(section: object) -> None:
-    for field in fields(section):  # type: ignore[arg-type]
-        value = getattr(section, field.name)
-        if isinstance(value, float) and value < 0:
-            raise ValueError(f"{field.name} must not be negative, found {value}")
+_MAY_BE_ZERO = ("stiffness", "angular_momentum_damping", "joint_damping", "stop_damping")
+
+
+def _numbers(section: Any) -> Iterator[tuple[str, float]]:
+    """Yield the path and value of every number, those of nested gains included."""
+    names = section._fields if isinstance(section, tuple) else [field.name for field in fields(section)]
+    for name in names:
+        value = getattr(section, name)
+        if isinstance(value, float):
+            yield name, value
+        else:
+            yield from ((f"{name}.{path}", number) for path, number in _numbers(value))

@@ -7,10 +7,11 @@ of an exhausted J N for a task and make accelerations of 1e13.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+
+from aerial_wbic.compiled import cholesky, cholesky_solve, compiled
 
 # Eigenvalues of J H⁻¹ Jᵀ, inverse inertias [1/kg] (for momenta: [kg]).
 MOVABLE = (
@@ -19,8 +20,7 @@ MOVABLE = (
 NOISE = 1e-9  # a direction below this is left to lower tasks
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Task:
+class Task(NamedTuple):
     """One physical statement about a task coordinate x with ẋ = J q̇: its acceleration and its velocity.
 
     The velocity is not needed for the acceleration; it tells which way the joints are about to move.
@@ -31,7 +31,8 @@ class Task:
     xdot: np.ndarray  # ẋ_ref (m,)
 
 
-def prioritized(M_inv: np.ndarray, tasks: Iterable[Task]) -> tuple[np.ndarray, np.ndarray]:
+@compiled
+def prioritized(M_inv: np.ndarray, tasks: tuple[Task, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Return q̈_cmd and q̇_ref ``(nv,)`` of tasks in falling priority, thesis (3.23), the same for both.
 
     Of those that do equally well they are the ones of least kinetic energy, the least in the metric of H.
@@ -45,38 +46,39 @@ def prioritized(M_inv: np.ndarray, tasks: Iterable[Task]) -> tuple[np.ndarray, n
     N = np.eye(nv)  # projects on what the tasks so far leave free
     free = nv  # dimensions of that
     for task in tasks:
-        if not len(task.a):
-            continue
-        J_pre = task.J @ N
-        J_bar, J_bar_owned, rank = consistent_inverses(J_pre, M_inv)
-        command = command + J_bar @ (np.column_stack([task.a, task.xdot]) - task.J @ command)
-        free -= rank
-        if free == 0:
-            break
-        N = N - J_bar_owned @ J_pre
-    return command[:, 0], command[:, 1]
+        if len(task.a) > 0 and free > 0:
+            J_pre = task.J @ N
+            J_bar, J_bar_owned, rank = consistent_inverses(J_pre, M_inv)
+            gap = np.empty((len(task.a), 2))
+            gap[:, 0], gap[:, 1] = task.a, task.xdot
+            command += J_bar @ (gap - task.J @ command)
+            free -= rank
+            N -= J_bar_owned @ J_pre
+    return command[:, 0].copy(), command[:, 1].copy()
 
 
+@compiled
 def consistent_inverses(J: np.ndarray, M_inv: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
     """Return J^dyn = H⁻¹ Jᵀ (J H⁻¹ Jᵀ)⁺ ``(nv, m)``, thesis (3.20), of what can be moved and of all that J owns.
 
     The third is the number of directions J ``(m, nv)`` owns. As a rule all can be moved and both are the same.
     """
-    M_inv_Jt = M_inv @ J.T
-    A = J @ M_inv_Jt
-    if _is_movable(A):
-        J_bar = M_inv_Jt @ np.linalg.inv(A)
+    J_M_inv = J @ M_inv
+    A = J_M_inv @ J.T
+    L = np.empty_like(A)
+    if cholesky(A, L) > MOVABLE:  # every row adds to those before
+        cholesky_solve(L, J_M_inv)
+        J_bar = np.ascontiguousarray(J_M_inv.T)
         return J_bar, J_bar, len(A)
     eigenvalues, U = np.linalg.eigh(A)
-    movable, owned = eigenvalues > MOVABLE, eigenvalues > NOISE
-    inverse_of = [M_inv_Jt @ ((U[:, some] / eigenvalues[some]) @ U[:, some].T) for some in (movable, owned)]
-    return inverse_of[0], inverse_of[1], int(owned.sum())
-
-
-def _is_movable(A: np.ndarray) -> bool:
-    """Return whether every row of a symmetric matrix ``(m, m)`` adds to those before: the usual case, cheap to see."""
-    try:
-        pivots = np.linalg.cholesky(A).diagonal()
-    except np.linalg.LinAlgError:
-        return False
-    return bool(pivots.min() ** 2 > MOVABLE)
+    M_inv_Jt_U = J_M_inv.T @ np.ascontiguousarray(U)
+    movable, owned = np.zeros((2, len(A)))
+    rank = 0
+    for i, eigenvalue in enumerate(eigenvalues):
+        if eigenvalue > NOISE:
+            owned[i] = 1 / eigenvalue
+            rank += 1
+        if eigenvalue > MOVABLE:
+            movable[i] = owned[i]
+    Ut = np.ascontiguousarray(U.T)
+    return (M_inv_Jt_U * movable) @ Ut, (M_inv_Jt_U * owned) @ Ut, rank

@@ -11,8 +11,7 @@ are multiplied by √Q_1 H_bb⁻¹, so that cost and equality are both of unit s
 
 from __future__ import annotations
 
-import logging
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import osqp
@@ -21,8 +20,8 @@ from scipy import sparse
 from aerial_model.contact import friction_pyramid
 from aerial_model.kinematics import Configuration
 from aerial_model.robot import BASE_TWIST, Robot
+from aerial_wbic.compiled import cholesky, cholesky_solve, compiled
 
-_LOG = logging.getLogger(__name__)
 _N_BASE = 6
 _SETTINGS = {
     "verbose": False,
@@ -42,8 +41,7 @@ _HARD = {"rho": 100.0, "max_iter": 2500}  # up to 1 ms
 _ACCEPTED = (osqp.SolverStatus.OSQP_SOLVED, osqp.SolverStatus.OSQP_SOLVED_INACCURATE)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Solution:
+class Solution(NamedTuple):
     """Acceleration and forces that obey the equations of motion of the base."""
 
     vdot: np.ndarray  # (nv,) base as physics has it, joints as commanded
@@ -61,8 +59,9 @@ class ForceOptimization:
     """
 
     def __init__(self, robot: Robot, weight_base: float, weight_force: float) -> None:
-        self._pyramid = friction_pyramid(robot.friction_coefficient)
-        self._programs = [_Program(n, self._pyramid, weight_base, weight_force) for n in range(1, robot.n_contacts + 1)]
+        pyramid = friction_pyramid(robot.friction_coefficient)
+        self._programs = [_Program(n, pyramid, weight_base, weight_force) for n in range(1, robot.n_contacts + 1)]
+        self._friction = float(pyramid[0, 2])
 
     def solve(self, state: Configuration, vdot_cmd: np.ndarray, f_cmd: np.ndarray, contact: np.ndarray) -> Solution:
         """Return the forces and the acceleration of (3.24).
@@ -75,31 +74,14 @@ class ForceOptimization:
             f_cmd: planned forces ``(n_c, 3)`` [N] in W.
             contact: points that carry load ``(n_c,)`` bool.
         """
-        M_base = state.M[BASE_TWIST]  # (6, nv)
-        M_bb_inv = np.linalg.inv(M_base[:, BASE_TWIST])
-        missing = -(M_base @ vdot_cmd + state.nle[BASE_TWIST])  # what forces and δ_q must supply, (6,)
-        loaded = np.flatnonzero(contact)
-        force = np.zeros_like(f_cmd)
-        solved = True
-        if len(loaded):
-            G = state.J_contacts[loaded, :, BASE_TWIST].reshape(-1, _N_BASE).T  # S_fb J_cᵀ (6, 3 n)
-            f_0 = f_cmd[loaded].ravel()
-            df = self._programs[len(loaded) - 1].solve(M_bb_inv @ G, M_bb_inv @ (missing + G @ f_0), f_0)
-            solved = df is not None
-            f_r = f_0 + df if df is not None else self._moved_into_pyramid(f_0)
-            force[loaded] = f_r.reshape(-1, 3)
-            missing = missing + G @ f_r
-        # δ_q from the forces themselves, so that the equations of motion hold to rounding.
-        vdot = vdot_cmd.copy()
-        vdot[BASE_TWIST] += M_bb_inv @ missing
-        return Solution(vdot=vdot, force=force, solved=solved)
+        n = np.count_nonzero(contact)
+        df = self._programs[n - 1].solve(state, vdot_cmd, f_cmd, contact) if n else _NO_FORCE
+        solved = df is not None
+        force, vdot = _outcome(state, vdot_cmd, f_cmd, contact, df if solved else _NO_FORCE, solved, self._friction)
+        return Solution(vdot, force, solved)
 
-    def _moved_into_pyramid(self, f: np.ndarray) -> np.ndarray:
-        f = f.reshape(-1, 3).copy()
-        f[:, 2] = np.maximum(f[:, 2], 0.0)
-        mu = self._pyramid[0, 2]
-        f[:, :2] = np.clip(f[:, :2], -mu * f[:, 2:], mu * f[:, 2:])
-        return f.ravel()
+
+_NO_FORCE = np.zeros(0)
 
 
 class _Program:
@@ -109,18 +91,19 @@ class _Program:
     """
 
     def __init__(self, n: int, pyramid: np.ndarray, weight_base: float, weight_force: float) -> None:
-        self._W = np.kron(np.eye(n), pyramid)  # (5 n, 3 n)
-        self._root_base, self._root_force = np.sqrt(weight_base), np.sqrt(weight_force)
-        variables, rows = _N_BASE + 3 * n, _N_BASE + len(self._W)
+        self._pyramid = pyramid
+        self._root_base, self._root_force = float(np.sqrt(weight_base)), float(np.sqrt(weight_force))
+        variables, rows = _N_BASE + 3 * n, _N_BASE + len(pyramid) * n
         A = np.zeros((rows, variables))
         A[:_N_BASE, :_N_BASE] = np.eye(_N_BASE)
         A[:_N_BASE, _N_BASE:] = 1.0  # dense: changes with the state
-        A[_N_BASE:, _N_BASE:] = self._W / self._root_force
+        A[_N_BASE:, _N_BASE:] = np.kron(np.eye(n), pyramid) / self._root_force
         self._A = sparse.csc_matrix(A)
         column = np.repeat(np.arange(variables), np.diff(self._A.indptr))
-        self._changing = (self._A.indices < _N_BASE) & (column >= _N_BASE)  # in the order of columns
+        changing = (self._A.indices < _N_BASE) & (column >= _N_BASE)
+        self._changing = np.flatnonzero(changing).reshape(3 * n, _N_BASE)  # by column
         self._lower = np.zeros(rows)
-        self._upper = np.full(rows, np.inf)
+        self._upper = np.full(rows, osqp.constant("OSQP_INFTY"))
         self._solver = osqp.OSQP()
         self._solver.setup(
             sparse.eye(variables, format="csc"),
@@ -131,28 +114,24 @@ class _Program:
             **_SETTINGS,
             **_USUAL,
         )
+        self._core = self._solver._solver  # OSQP itself: the wrapper's bookkeeping takes longer than the solution
 
-    def solve(self, lift: np.ndarray, supply: np.ndarray, f_0: np.ndarray) -> np.ndarray | None:
-        """Return δ_f ``(3 n,)`` [N] of the best δ_q = ``lift`` δ_f + ``supply`` with W (f_0 + δ_f) ≥ 0, or None.
-
-        Args:
-            lift: H_bb⁻¹ S_fb J_cᵀ ``(6, 3 n)``, base acceleration per force.
-            supply: δ_q at δ_f = 0 ``(6,)``.
-            f_0: commanded forces ``(3 n,)`` [N].
-        """
-        self._A.data[self._changing] = (lift.T * (-self._root_base / self._root_force)).ravel()
-        self._lower[:_N_BASE] = self._upper[:_N_BASE] = self._root_base * supply
-        self._lower[_N_BASE:] = -(self._W @ f_0)
-        try:
-            self._solver.update(Ax=self._A.data, l=self._lower, u=self._upper)
+    def solve(
+        self, state: Configuration, vdot_cmd: np.ndarray, f_cmd: np.ndarray, contact: np.ndarray
+    ) -> np.ndarray | None:
+        """Return δ_f ``(3 n,)`` [N] of the loaded points, or None; arguments as those of the whole."""
+        root_base, root_force = self._root_base, self._root_force
+        A, lower, upper = self._A.data, self._lower, self._upper
+        _state_problem(
+            state, vdot_cmd, f_cmd, contact, self._pyramid, root_base, root_force, self._changing, A, lower, upper
+        )
+        self._core.update_data_vec(q=None, l=lower, u=upper)
+        self._core.update_data_mat(P_x=None, P_i=None, A_x=A, A_i=None)
+        x = self._minimum()
+        if x is None:
+            self._solver.update_settings(**_HARD)
             x = self._minimum()
-            if x is None:
-                self._solver.update_settings(**_HARD)
-                x = self._minimum()
-                self._solver.update_settings(**_USUAL)
-        except (ValueError, osqp.OSQPException) as error:
-            _LOG.warning("OSQP refused a problem: %s", error)
-            return None
+            self._solver.update_settings(**_USUAL)
         if x is None:
             self._solver.warm_start(x=np.zeros(self._A.shape[1]), y=np.zeros(self._A.shape[0]))
             return None
@@ -160,6 +139,89 @@ class _Program:
 
     def _minimum(self) -> np.ndarray | None:
         """Return the variables that OSQP finds; None if it gives up."""
-        result = self._solver.solve(raise_error=False)
-        solved = result.info.status_val in _ACCEPTED and np.all(np.isfinite(result.x))
-        return result.x if solved else None
+        self._core.solve()
+        if self._core.info.status_val not in _ACCEPTED:
+            return None
+        x = self._core.solution.x
+        return x if np.isfinite(x).all() else None
+
+
+@compiled
+def _state_problem(
+    state: Configuration,
+    vdot_cmd: np.ndarray,
+    f_cmd: np.ndarray,
+    contact: np.ndarray,
+    pyramid: np.ndarray,
+    root_base: float,
+    root_force: float,
+    changing: np.ndarray,
+    A: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+) -> None:
+    """Write this tick's numbers into the entries ``changing`` ``(3 n, 6)`` of A and into the bounds.
+
+    The rows of the equations of motion say √Q_1 δ_q = √Q_1 H_bb⁻¹ (S_fb J_cᵀ δ_f + what f_cmd leaves missing).
+    """
+    loaded = np.flatnonzero(contact)
+    columns = np.empty((_N_BASE, 3 * len(loaded) + 1))
+    for n, i in enumerate(loaded):
+        columns[:, 3 * n : 3 * n + 3] = state.J_contacts[i, :, :_N_BASE].T
+    columns[:, -1] = _missing(state, vdot_cmd, f_cmd, contact)
+    _solve_base(state, columns)
+    for column in range(len(changing)):
+        for row in range(_N_BASE):
+            A[changing[column, row]] = -root_base / root_force * columns[row, column]
+    lower[:_N_BASE] = upper[:_N_BASE] = root_base * columns[:, -1]
+    rows = len(pyramid)
+    for n, i in enumerate(loaded):
+        begin = _N_BASE + n * rows
+        lower[begin : begin + rows] = -(pyramid @ f_cmd[i])
+
+
+@compiled
+def _outcome(
+    state: Configuration,
+    vdot_cmd: np.ndarray,
+    f_cmd: np.ndarray,
+    contact: np.ndarray,
+    df: np.ndarray,
+    solved: bool,
+    friction: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return f_r ``(n_c, 3)`` and q̈ ``(nv,)``, the base's part from the forces: the equations of motion hold to rounding."""
+    force = np.zeros_like(f_cmd)
+    for n, i in enumerate(np.flatnonzero(contact)):
+        if solved:
+            force[i] = f_cmd[i] + df[3 * n : 3 * n + 3]
+        else:
+            normal = max(f_cmd[i, 2], 0.0)
+            side = friction * normal
+            force[i, 0] = min(max(f_cmd[i, 0], -side), side)
+            force[i, 1] = min(max(f_cmd[i, 1], -side), side)
+            force[i, 2] = normal
+    change = np.empty((_N_BASE, 1))
+    change[:, 0] = _missing(state, vdot_cmd, force, contact)
+    _solve_base(state, change)
+    vdot = vdot_cmd.copy()
+    vdot[BASE_TWIST] += change[:, 0]
+    return force, vdot
+
+
+@compiled
+def _solve_base(state: Configuration, columns: np.ndarray) -> None:
+    """Replace columns ``(6, k)`` by H_bb⁻¹ times them."""
+    L = np.empty((_N_BASE, _N_BASE))
+    cholesky(state.M[BASE_TWIST, BASE_TWIST], L)
+    cholesky_solve(L, columns)
+
+
+@compiled
+def _missing(state: Configuration, vdot_cmd: np.ndarray, force: np.ndarray, contact: np.ndarray) -> np.ndarray:
+    """Return S_fb (J_cᵀ f − H q̈_cmd − C q̇ − G) ``(6,)`` with the forces of the loaded points."""
+    wrench = -(state.M[BASE_TWIST] @ vdot_cmd) - state.nle[BASE_TWIST]
+    for i in np.flatnonzero(contact):
+        for k in range(3):
+            wrench += force[i, k] * state.J_contacts[i, k, BASE_TWIST]
+    return wrench

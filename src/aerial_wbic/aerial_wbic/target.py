@@ -5,7 +5,7 @@ Both give the same thing, so that one hierarchy serves take-off, flight, landing
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,17 +13,16 @@ from aerial_model import plan as plans
 from aerial_model import rotation
 from aerial_model.kinematics import Configuration
 from aerial_model.robot import BASE_ANGULAR, BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY
+from aerial_wbic.compiled import cholesky, cholesky_solve, compiled, exp_of, product_of, quaternion, vector
 from aerial_wbic.gains import BodyGains
-from aerial_wbic.settling import Settling
+from aerial_wbic.settling import REACH, TIME, Settling, settled, settling
 
-GRAVITY = np.array([0.0, 0.0, -9.81])  # in W [m/s²]
-GRAVITY.flags.writeable = False
+GRAVITY = 9.81  # [m/s²]
 REST_TOLERANCE = 0.2  # of the height at rest: farther off, something keeps the robot from standing
 _WRENCH_REGULARIZATION = 1e-6  # [m²] keeps the share of the load defined when the support is a line or a point
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class BodyTarget:
+class BodyTarget(NamedTuple):
     """Centre of mass and base attitude, in W, with the gains that hold them there."""
 
     com: np.ndarray  # (3,) [m]
@@ -35,8 +34,7 @@ class BodyTarget:
     gains: BodyGains
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class WholeBodyTarget:
+class WholeBodyTarget(NamedTuple):
     """Everything the hierarchy and the optimization follow in one tick."""
 
     body: BodyTarget
@@ -49,8 +47,7 @@ class WholeBodyTarget:
     contact: np.ndarray  # (n_c,) bool
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PostureTarget:
+class PostureTarget(NamedTuple):
     """Joint positions, for a robot that lies and has nothing to balance."""
 
     joint_position: np.ndarray  # (n,) [rad]
@@ -76,8 +73,8 @@ def from_plan(sample: plans.Target, gains: BodyGains) -> WholeBodyTarget:
         joint_acceleration=sample.vdot[JOINT_VELOCITY],
         angular_momentum=sample.angular_momentum,
         angular_momentum_rate=sample.angular_momentum_rate,
-        force=sample.force,
-        contact=sample.contact,
+        force=sample.force.copy(),  # whoever made the plan: compiled code takes writable arrays only
+        contact=sample.contact.copy(),
     )
 
 
@@ -110,21 +107,22 @@ class Hold:
         turn: float,
         gains: BodyGains,
     ) -> None:
-        self._gains = gains
-        self._begin = time
         velocity = state.com_velocity
-        rates = np.array([rate, rate, max(rate, Settling.REACH * abs(velocity[2]) / depth)])
+        rates = np.array([rate, rate, max(rate, REACH * abs(velocity[2]) / depth)])
         offset = state.com - support_centre(state)
         self._rest = np.array([0.0, 0.0, com_height])
-        self._offset = Settling(offset, velocity, self._rest, rates)
         # The attitude as a rotation vector from the level attitude of the present heading.
-        self._level = rotation.about_z(rotation.heading(state.base_orientation))
-        tilt = rotation.log(rotation.multiply(state.base_orientation, rotation.conjugate(self._level)))
+        level = rotation.about_z(rotation.heading(state.base_orientation))
+        tilt = rotation.log(rotation.multiply(state.base_orientation, rotation.conjugate(level)))
         spin = state.R_WB @ state.v[BASE_ANGULAR]
-        self._tilt = Settling(tilt, spin, np.zeros(3), max(rate, Settling.REACH * np.linalg.norm(spin) / turn))
-        self._contact = np.ones(state.robot.n_contacts, dtype=bool)
-        self._zeros = np.zeros(state.robot.n_joints)
-        self.end = time + Settling.TIME / rate
+        self._course = _Course(
+            begin=time,
+            offset=settling(offset, velocity, self._rest, rates),
+            tilt=settling(tilt, spin, np.zeros(3), max(rate, REACH * float(np.linalg.norm(spin)) / turn)),
+            level=level,
+            gains=gains,
+        )
+        self.end = time + TIME / rate
 
     def reached(self, state: Configuration) -> bool:
         """Return whether the centre of mass is where it is to rest, give or take a part of its height."""
@@ -132,27 +130,43 @@ class Hold:
 
     def at(self, time: float, state: Configuration) -> WholeBodyTarget:
         """Return the target at ``time`` [s] of a robot at ``state``."""
-        offset, velocity, acceleration = self._offset.at(time - self._begin)
-        tilt, angular_velocity, angular_acceleration = self._tilt.at(time - self._begin)
-        body = BodyTarget(
-            com=support_centre(state) + offset,
-            com_velocity=velocity,
-            com_acceleration=acceleration,
-            orientation=rotation.multiply(rotation.exp(tilt), self._level),
-            angular_velocity=angular_velocity,
-            angular_acceleration=angular_acceleration,
-            gains=self._gains,
-        )
-        return WholeBodyTarget(
-            body=body,
-            joint_position=state.q[JOINT_POSITION],
-            joint_velocity=self._zeros,
-            joint_acceleration=self._zeros,
-            angular_momentum=state.angular_momentum,
-            angular_momentum_rate=np.zeros(3),
-            force=shared_load(state, acceleration),
-            contact=self._contact,
-        )
+        return _held(self._course, time, state)
+
+
+class _Course(NamedTuple):
+    """The way to rest: of the centre of mass from the centre of the support, and of the attitude from ``level``."""
+
+    begin: float  # [s]
+    offset: Settling  # [m]
+    tilt: Settling  # rotation vector in W [rad]
+    level: np.ndarray  # (4,)
+    gains: BodyGains
+
+
+@compiled
+def _held(course: _Course, time: float, state: Configuration) -> WholeBodyTarget:
+    offset, velocity, acceleration = settled(course.offset, time - course.begin)
+    tilt, angular_velocity, angular_acceleration = settled(course.tilt, time - course.begin)
+    body = BodyTarget(
+        support_centre(state) + offset,
+        velocity,
+        acceleration,
+        np.array(product_of(exp_of(vector(tilt)), quaternion(course.level))),
+        angular_velocity,
+        angular_acceleration,
+        course.gains,
+    )
+    n = len(state.v) - JOINT_VELOCITY.start
+    return WholeBodyTarget(
+        body,
+        state.q[JOINT_POSITION],
+        np.zeros(n),
+        np.zeros(n),
+        state.angular_momentum,
+        np.zeros(3),
+        shared_load(state, acceleration),
+        np.ones(len(state.contact_positions), dtype=np.bool_),
+    )
 
 
 class Fold:
@@ -167,30 +181,39 @@ class Fold:
 
     def __init__(self, state: Configuration, time: float, *, rate: float, pose: np.ndarray) -> None:
         self._begin = time
-        self._joints = Settling(state.q[JOINT_POSITION], state.v[JOINT_VELOCITY], pose, rate)
-        self.end = time + Settling.TIME / rate
+        self._joints = settling(state.q[JOINT_POSITION], state.v[JOINT_VELOCITY], pose, rate)
+        self.end = time + TIME / rate
 
     def at(self, time: float, state: Configuration) -> PostureTarget:
         """Return the target at ``time`` [s]; where the robot is does not matter."""
-        position, velocity, _ = self._joints.at(time - self._begin)
+        position, velocity, _ = settled(self._joints, time - self._begin)
         return PostureTarget(joint_position=position, joint_velocity=velocity)
 
 
+@compiled
 def support_centre(state: Configuration) -> np.ndarray:
     """Return the mean of the contact spheres' centres ``(3,)`` [m] in W."""
-    return state.contact_positions.mean(axis=0)
+    return state.contact_positions.sum(axis=0) / len(state.contact_positions)
 
 
+@compiled
 def shared_load(state: Configuration, com_acceleration: np.ndarray) -> np.ndarray:
     """Return forces ``(n_c, 3)`` [N] in W that accelerate the centre of mass and do not turn the body.
 
     Every point takes a share w_i of the same force F = m (r̈ − g): Σ w_i = 1, and Σ w_i c_i lies where F through the
     centre of mass meets the height of the support. Of these shares it is the most even one; none is negative.
     """
-    F = state.robot.mass * (com_acceleration - GRAVITY)
+    F = state.mass * com_acceleration
+    F[2] += state.mass * GRAVITY
     arms = state.contact_positions - state.com  # (n_c, 3)
-    A = np.vstack([np.ones(len(arms)), arms[:, :2].T])  # (3, n_c)
-    reach = arms[:, 2].mean() * F[:2] / F[2] if F[2] > 0 else np.zeros(2)
-    b = np.array([1.0, *reach])
-    w = A.T @ np.linalg.solve(A @ A.T + _WRENCH_REGULARIZATION * np.eye(3), b)
-    return np.maximum(w, 0.0)[:, None] * F
+    A = np.ones((3, len(arms)))
+    A[1:] = arms[:, :2].T
+    b = np.zeros((3, 1))
+    b[0] = 1.0
+    if F[2] > 0:
+        b[1:, 0] = arms[:, 2].mean() * F[:2] / F[2]
+    L = np.empty((3, 3))
+    cholesky(A @ A.T + _WRENCH_REGULARIZATION * np.eye(3), L)
+    cholesky_solve(L, b)
+    w = A.T @ b  # (n_c, 1)
+    return np.maximum(w, 0.0) * F

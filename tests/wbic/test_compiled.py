@@ -1,0 +1,44 @@
+"""The compiled formulas: linear algebra against numpy, and that no tick has to compile anything."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aerial_model.plan_file import save_plan
+from aerial_wbic.compiled import cholesky, cholesky_solve
+
+ROUNDING = 1e-10
+TICKS_OF_EVERYTHING = Path(__file__).with_name("ticks_of_everything.py")
+
+
+@pytest.mark.parametrize("m", [1, 3, 12])
+def test_factor_and_solution_are_numpys(m):
+    random = np.random.default_rng(m)
+    A = random.normal(size=(m, m))
+    A = A @ A.T + 0.1 * np.eye(m)
+    B = random.normal(size=(m, 2))
+    L, X = np.zeros((m, m)), B.copy()
+    least = cholesky(A, L)
+    cholesky_solve(L, X)
+    np.testing.assert_allclose(L, np.linalg.cholesky(A), atol=ROUNDING)
+    np.testing.assert_allclose(A @ X, B, atol=ROUNDING)
+    assert least == pytest.approx(L.diagonal().min() ** 2)
+
+
+def test_a_matrix_that_is_not_positive_is_told_by_its_pivot():
+    A = np.diag([1.0, -2.0, 3.0])
+    assert cholesky(A, np.zeros((3, 3))) == -2.0
+
+
+def test_no_tick_compiles_anything(hop, tmp_path):
+    """In a process of its own: what other tests have compiled would hide it."""
+    save_plan(hop, tmp_path / "hop.npz")
+    process = subprocess.run(
+        [sys.executable, TICKS_OF_EVERYTHING, tmp_path / "hop.npz"], capture_output=True, text=True
+    )
+    assert (process.returncode, process.stdout.strip()) == (0, "compiled in a tick: nothing"), process.stderr
