@@ -9,7 +9,7 @@ import pytest
 
 SOURCES = Path(__file__).resolve().parents[2] / "src"
 PACKAGES = sorted(setup.parent.name for setup in SOURCES.glob("*/setup.py"))
-ROSDEP_KEYS = {"PIL": "python3-pil", "numpy": "python3-numpy"}
+ROSDEP_KEYS = {"PIL": "python3-pil", "matplotlib": "python3-matplotlib", "numpy": "python3-numpy"}
 ROSDEP_KEYS |= {"scipy": "python3-scipy", "yaml": "python3-yaml"}
 WITHOUT_ROSDEP_KEY = {"casadi", "coal", "mujoco", "osqp", "pinocchio", "rosbags"}  # README: from requirements.txt
 

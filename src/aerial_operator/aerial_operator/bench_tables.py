@@ -29,16 +29,24 @@ def tables(rows: Sequence[Row]) -> str:
     return "\n\n".join(texts)
 
 
+def _spread(times: Mapping[str, float] | None, which: str) -> str:
+    return "–" if times is None else f"{times[which]:.3f} s"
+
+
 def _seconds(name: str, which: str = "p50") -> Callable[[Row], str]:
-    return lambda row: "–" if row[name] is None else f"{row[name][which]:.3f} s"
+    return lambda row: _spread(row[name], which)
 
 
-def _solved(row: Row) -> str:
-    return f"{row['solved']}/{row['trials']}"
+def _count(name: str, of: str = "trials") -> Callable[[Row], str]:
+    return lambda row: f"{row[name]}/{row[of]}"
 
 
-def _accepted(row: Row) -> str:
-    return f"{row['accepted']}/{row['trials']}"
+def _ratio(name: str) -> Callable[[Row], str]:
+    return lambda row: percent(row[name])
+
+
+def _beyond(part: str, name: str, digits: int = 0) -> Callable[[Row], str]:
+    return lambda row: "–" if row[part] is None else f"{100 * row[part][name]:.{digits}f} %"
 
 
 def _variant(row: Row) -> str:
@@ -49,20 +57,79 @@ def _iterations(row: Row) -> str:
     return "–" if row["iterations"] is None else f"{row['iterations']['p50']:.0f}"
 
 
+def _reach(row: Row) -> str:
+    ends = row["reach"] or {}
+    return ", ".join(f"{axis} {low:.2f}…{high:.2f}" for axis, (low, high) in ends.items())
+
+
+def _motion(row: Row) -> str:
+    return row["motion"]
+
+
+_TIMES = {"median": _seconds("total_time_s"), "95 %": _seconds("total_time_s", "p95"), "CPU": _seconds("cpu_time_s")}
+_COUNTS = {"solved": _count("solved"), "within limits": _count("accepted")}
+
 _TABLES = {
     "variants": _Table(
         "Variants (thesis, table 4.1): request to plan; peaks by exact inverse dynamics",
         {
-            "motion": lambda row: row["motion"],
+            "motion": _motion,
             "variant": _variant,
-            "solved": _solved,
-            "within limits": _accepted,
-            "median": _seconds("total_time_s"),
-            "95 %": _seconds("total_time_s", "p95"),
-            "CPU": _seconds("cpu_time_s"),
+            **_COUNTS,
+            **_TIMES,
             "iterations": _iterations,
-            "peak torque": lambda row: percent(row["peak_torque_ratio"]),
-            "peak voltage": lambda row: percent(row["peak_voltage_ratio"]),
+            "peak torque": _ratio("peak_torque_ratio"),
+            "peak voltage": _ratio("peak_voltage_ratio"),
+        },
+    ),
+    "literal": _Table(
+        "The thesis's own formulation and solver (IPOPT/MUMPS), AAKD*+WS, its solve alone, next to request to plan here",
+        {
+            "motion": _motion,
+            "converged": _count("converged"),
+            "construction": _seconds("construction_time_s"),
+            "its solve": _seconds("solve_time_s"),
+            "its iterations": _iterations,
+            "here": lambda row: _spread(row["reduced"]["total_time_s"], "p50"),
+            "times faster": lambda row: "–" if row["speed_ratio"] is None else f"{row['speed_ratio']:.1f}",
+        },
+    ),
+    "knots": _Table(
+        "Take-off knots, the duration kept: AAKD*+WS",
+        {
+            "motion": _motion,
+            "knots": lambda row: str(row["knots"]),
+            "dt": lambda row: f"{1000 * row['dt_s']:.2f} ms",
+            **_COUNTS,
+            **_TIMES,
+            "iterations": _iterations,
+        },
+    ),
+    "robots": _Table(
+        "Robots: AAKD*+WS",
+        {
+            "robot": lambda row: row["robot"],
+            "joints": lambda row: str(row["joints"]),
+            "motion": _motion,
+            **_COUNTS,
+            **_TIMES,
+            "iterations": _iterations,
+            "unsuited": lambda row: row["unsuited"] or "",
+        },
+    ),
+    "goals": _Table(
+        "Goals inside 80 % of the reach, with warm start; share of joint samples beyond a limit by exact inverse dynamics",
+        {
+            "goals": lambda row: row["family"],
+            "variant": lambda row: row["variant"],
+            **_COUNTS,
+            **_TIMES,
+            "take-off beyond": _beyond("take_off", "beyond", 1),
+            "by 20 %": _beyond("take_off", "far_beyond", 2),
+            "worst torque": _beyond("take_off", "worst_torque_ratio"),
+            "voltage": _beyond("take_off", "worst_voltage_ratio"),
+            "flight beyond": _beyond("flight", "beyond", 2),
+            "reach [m, turns]": _reach,
         },
     ),
 }

@@ -4,12 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
+from aerial_evaluation.bench.goals import goals
+from aerial_evaluation.bench.literal import literal
+from aerial_evaluation.bench.profiles import profiles
 from aerial_evaluation.bench.samples import Row
+from aerial_evaluation.bench.scaling import knots, robots
 from aerial_evaluation.bench.subject import Subject
 from aerial_evaluation.bench.variants import variants
 
 SECTIONS: dict[str, Callable[[Subject], list[Row]]] = {
     "variants": variants,
+    "literal": literal,
+    "knots": knots,
+    "robots": robots,
+    "goals": goals,
+    "profiles": profiles,
 }
 
 

@@ -28,6 +28,7 @@ class Subject:
     repeats: int = 10
     goals: int = 50  # of each kind
     seed: int = 0
+    folder: Path = Path("out/bench")  # for figures
     cache: Path | None = None  # of compiled functions; None: interpreted ones
     progress: Callable[[str], None] = field(default=lambda _: None)  # told what is measured now
 

@@ -47,6 +47,7 @@ def run(args: argparse.Namespace) -> Report:
         repeats=args.repeats,
         goals=args.goals,
         seed=args.seed,
+        folder=args.out,
         cache=default_cache() if args.compiled else None,
         progress=say,
     )

@@ -1,0 +1,61 @@
+"""The thesis's own formulation, solved by its own solver, next to ours on the same problem in the same run."""
+
+from __future__ import annotations
+
+from aerial_evaluation.bench.samples import Row, measure, percentiles, summary
+from aerial_evaluation.bench.subject import Subject, usual_request
+from aerial_planner.inverse_kinematics import InverseKinematics
+from aerial_planner.kino_dynamic import Variant
+from aerial_planner.reference import body_reference
+from aerial_planner.schedule import contact_schedule, load_motion
+from aerial_planner.srbm import SingleRigidBody
+from aerial_planner.symbolic import base_frame_model
+from aerial_planner.thesis_literal import LiteralProblem, LiteralSolution
+from aerial_planner.transcription import SolverOptions
+
+REPEATS = 3  # at most: it is slow
+
+
+def literal(subject: Subject) -> list[Row]:
+    """Return one row per motion: AAKD* from the single-rigid-body optimum, thesis-literal with IPOPT/MUMPS, and ours.
+
+    ``speed_ratio`` is the literal solve alone over all that a user waits for ours, checks included.
+    """
+    rows = []
+    for motion in subject.motions:
+        request = usual_request(motion)
+        subject.planner.warm_up(request)
+        measure(subject.planner, request)
+        theirs, ours = [], []
+        repeats = min(REPEATS, subject.repeats)
+        for repeat in range(repeats):
+            subject.progress(f"thesis-literal {motion}: {repeat + 1} of {repeats}")
+            theirs.append(_solve(subject, motion))
+            ours.append(measure(subject.planner, request))
+        rows.append({"motion": motion, **_figures(theirs), "reduced": summary(ours)})
+        solve, total = rows[-1]["solve_time_s"], rows[-1]["reduced"]["total_time_s"]
+        rows[-1]["speed_ratio"] = None if solve is None or total is None else solve["p50"] / total["p50"]
+    return rows
+
+
+def _figures(solutions: list[LiteralSolution]) -> Row:
+    converged = [solution for solution in solutions if solution.converged]
+    return {
+        "trials": len(solutions),
+        "converged": len(converged),
+        "construction_time_s": percentiles(solution.construction_time for solution in solutions),
+        "solve_time_s": percentiles(solution.solve_time for solution in converged),
+        "unconverged_time_s": percentiles(s.solve_time for s in solutions if not s.converged),
+        "iterations": percentiles(solution.iterations for solution in solutions),
+    }
+
+
+def _solve(subject: Subject, motion: str) -> LiteralSolution:
+    """Return the literal solution of the motion's usual request, built anew as the thesis's is."""
+    robot, settings = subject.robot, subject.planner.settings
+    model = base_frame_model(robot)
+    ik = InverseKinematics(robot, model)
+    schedule = contact_schedule(usual_request(motion), load_motion(motion), robot, settings.dt, settings.flight_knots)
+    reference = body_reference(schedule, robot.standing_configuration(), robot, model, ik, settings)
+    guess, _ = SingleRigidBody(robot, model, ik, settings, SolverOptions()).solve(schedule, reference)
+    return LiteralProblem(robot, model, settings, Variant.AAKD_STAR, schedule, reference).solve(guess)
