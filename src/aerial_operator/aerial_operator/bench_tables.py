@@ -94,6 +94,22 @@ _TABLES = {
             "times faster": lambda row: "–" if row["speed_ratio"] is None else f"{row['speed_ratio']:.1f}",
         },
     ),
+    "crocoddyl": _Table(
+        "crocoddyl's FDDP on the same jump, its solve alone, next to request to plan here; what its solution is worth",
+        {
+            "motion": _motion,
+            "knots": lambda row: f"{row['knots']} + {row['flight_knots']}",
+            "converged": _count("converged"),
+            "its solve": _seconds("solve_time_s"),
+            "its iterations": _iterations,
+            "here": lambda row: _spread(row["reduced"]["total_time_s"], "p50"),
+            "solve here": lambda row: _spread(row["reduced"]["solve_time_s"], "p50"),
+            "times faster": lambda row: "–" if row["speed_ratio"] is None else f"{row['speed_ratio']:.2f}",
+            "off the goal": lambda row: f"{100 * row['landing_error_m']:.1f} cm, {row['landing_tilt_deg']:.1f}°",
+            "torque": _ratio("peak_torque_ratio"),
+            "voltage": _ratio("peak_voltage_ratio"),
+        },
+    ),
     "knots": _Table(
         "Take-off knots, the duration kept: AAKD*+WS",
         {

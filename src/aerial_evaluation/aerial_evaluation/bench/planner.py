@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
+from aerial_evaluation.bench.crocoddyl import crocoddyl
 from aerial_evaluation.bench.goals import goals
 from aerial_evaluation.bench.literal import literal
 from aerial_evaluation.bench.profiles import profiles
@@ -15,6 +16,7 @@ from aerial_evaluation.bench.variants import variants
 SECTIONS: dict[str, Callable[[Subject], list[Row]]] = {
     "variants": variants,
     "literal": literal,
+    "crocoddyl": crocoddyl,
     "knots": knots,
     "robots": robots,
     "goals": goals,

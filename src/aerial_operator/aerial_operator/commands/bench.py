@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from aerial_evaluation.bench.crocoddyl import Environment
 from aerial_evaluation.bench.machine import machine
 from aerial_evaluation.bench.planner import SECTIONS, measured
 from aerial_evaluation.bench.subject import Subject, motions_in_order
@@ -26,21 +27,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--sections",
         metavar="NAME[,…]",
         type=_names,
-        default=tuple(SECTIONS),
-        help=f"of the benchmark (default: all): {', '.join(SECTIONS)}",
+        help=f"of the benchmark (default: all, crocoddyl where it is installed): {', '.join(SECTIONS)}",
     )
     parser.add_argument("--motions", metavar="NAME[,…]", type=_names, help="(default: all)")
     parser.add_argument("--repeats", metavar="N", type=int, default=REPEATS, help=f"(default: {REPEATS})")
     parser.add_argument("--goals", metavar="N", type=int, default=GOALS, help=f"of each motion (default: {GOALS})")
     parser.add_argument("--compiled", action="store_true", help="use what `aerial compile` made, where it made it")
+    parser.add_argument(
+        "--with-crocoddyl", action="store_true", help="install crocoddyl for itself, if it is not there"
+    )
     parser.add_argument("--out", metavar="FOLDER", type=Path, default=Path("out/bench"), help="(default: out/bench)")
 
 
 def run(args: argparse.Namespace) -> Report:
     """Measure section by section; the file holds what is measured so far, if a long run is interrupted."""
-    for name in args.sections:
-        if name not in SECTIONS:
-            raise UsageError(f"no section '{name}'{closest(name, SECTIONS)}; there are {', '.join(SECTIONS)}")
+    sections = _sections(args)
     subject = Subject(
         robot=Robot.load(args.robot),
         motions=args.motions or motions_in_order(),
@@ -60,11 +61,29 @@ def run(args: argparse.Namespace) -> Report:
         "rows": [],
     }
     file = args.out / f"{args.what}.json"
-    for row in measured(subject, args.sections):
+    for row in measured(subject, sections):
         figures["rows"].append(row)
         _write(file, to_json(figures))
     say(f"figures are in {file}")
     return Report(success=True, figures=figures, text=tables(figures["rows"]))
+
+
+def _sections(args: argparse.Namespace) -> list[str]:
+    """Return what to measure; a peer that is not installed is left out, unless it is asked for."""
+    for name in args.sections or ():
+        if name not in SECTIONS:
+            raise UsageError(f"no section '{name}'{closest(name, SECTIONS)}; there are {', '.join(SECTIONS)}")
+    environment = Environment()
+    if args.with_crocoddyl and not environment.is_made:
+        say(f"installing crocoddyl in {environment.folder}")
+        environment.make()
+    sections = list(args.sections or SECTIONS)
+    if "crocoddyl" in sections and not environment.is_made:
+        if args.sections:
+            raise ConfigurationError(environment.missing)
+        say(f"left out: {environment.missing}")
+        sections.remove("crocoddyl")
+    return sections
 
 
 def _names(text: str) -> tuple[str, ...]:

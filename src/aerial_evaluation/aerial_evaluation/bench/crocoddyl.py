@@ -1,0 +1,203 @@
+"""A peer on the same jump: crocoddyl's FDDP, in an environment of its own because it needs another Pinocchio.
+
+``crocoddyl_jump.py`` is what runs there; it says what FDDP leaves out of the planner's problem. crocoddyl and its
+dependencies are free software (BSD and the like); nothing of them is part of this project.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import subprocess
+import sys
+import venv
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from aerial_evaluation.bench.samples import Row, measure, percentiles, summary
+from aerial_evaluation.bench.scaling import KNOTS
+from aerial_evaluation.bench.subject import Subject, usual_request
+from aerial_model.errors import AerialError
+from aerial_model.plan import Plan
+from aerial_model.robot import Robot
+from aerial_planner.compiled import default_cache
+from aerial_planner.planner import Planner
+from aerial_planner.schedule import contact_schedule, load_motion
+from aerial_planner.settings import PlannerSettings
+
+REQUIREMENTS = (
+    # crocoddyl 3.2.1 crashes with pin 4.1.0
+    *("crocoddyl==3.2.1", "libcrocoddyl==3.2.1", "pin==4.0.0", "libpinocchio==4.0.0", "numpy==2.4.6"),
+    *("eigenpy==3.13.0", "coal==3.0.3", "libcoal==3.0.3", "example-robot-data==5.0.0"),
+    *("example-robot-data-loaders==5.0.0", "jrl-cmakemodules==2.1.0", "cmeel==0.62.0", "cmeel-assimp==6.0.5"),
+    *("cmeel-boost==1.90.0", "cmeel-console-bridge==1.0.2.3", "cmeel-octomap==1.10.0", "cmeel-qhull==8.0.2.1"),
+    *("cmeel-tinyxml2==11.0.0", "cmeel-urdfdom==6.0.0", "cmeel-zlib==1.3.2"),
+)
+_SCRIPT = Path(__file__).with_name("crocoddyl_jump.py")
+_TOLERANCE = 1e-4  # at which FDDP stops, as the planner's solver does
+_MAX_ITERATIONS = 100
+_WORTH = ("landing_error_m", "landing_tilt_deg", "peak_torque_ratio", "peak_voltage_ratio", "friction_excess")
+
+
+class PeerError(AerialError):
+    """The peer's environment is missing, or what runs in it failed."""
+
+
+class Environment:
+    """A virtual environment with crocoddyl.
+
+    Args:
+        folder: where it is, or is to be.
+    """
+
+    def __init__(self, folder: Path | None = None) -> None:
+        self.folder = default_cache() / "crocoddyl" if folder is None else folder
+        self._stamp = self.folder / "made-from"
+
+    @property
+    def is_made(self) -> bool:
+        """It holds what ``REQUIREMENTS`` says."""
+        return self._stamp.is_file() and self._stamp.read_text(encoding="utf-8").split() == list(REQUIREMENTS)
+
+    @property
+    def missing(self) -> str:
+        """What to do when it is not made."""
+        return (
+            f"{REQUIREMENTS[0]} is not in {self.folder}, where it needs an environment with another Pinocchio: "
+            "`./aerial bench planner --with-crocoddyl` makes it, once (1 GB)"
+        )
+
+    def make(self) -> None:
+        """Make it anew.
+
+        Raises:
+            PeerError: with the end of pip's output.
+        """
+        try:
+            venv.create(self.folder, clear=True, with_pip=False)
+        except OSError as error:
+            raise PeerError(f"{self.folder}: cannot be made ({error.strerror})") from None
+        install = ("-m", "pip", "--python", str(self._python), "install", "--no-input", "--quiet", *REQUIREMENTS)
+        _run([sys.executable, *install], "")
+        self._stamp.write_text("\n".join(REQUIREMENTS), encoding="utf-8")
+
+    def solve(self, problem: dict[str, Any]) -> dict[str, Any]:
+        """Return what the script says about a problem.
+
+        Raises:
+            PeerError: if the environment is missing, or the script fails.
+        """
+        if not self.is_made:
+            raise PeerError(self.missing)
+        return json.loads(_run([str(self._python), "-I", str(_SCRIPT)], json.dumps(problem)))
+
+    @property
+    def _python(self) -> Path:
+        return self.folder / "bin" / "python"
+
+
+def crocoddyl(subject: Subject) -> list[Row]:
+    """Return one row per jump and number of knots: FDDP's solve alone, and ours from request to checked plan.
+
+    Raises:
+        PeerError: if there is no crocoddyl.
+    """
+    rows = []
+    environment = Environment()
+    for motion in subject.motions:
+        if load_motion(motion).rotation is not None:
+            continue
+        for settings in _settings(subject, motion):
+            rows.append(_row(subject, motion, settings, environment))
+    return rows
+
+
+def _settings(subject: Subject, motion: str) -> list[PlannerSettings]:
+    """Return settings by which the take-off has the ``KNOTS``."""
+    usual = subject.planner.settings
+    schedule = contact_schedule(usual_request(motion), load_motion(motion), subject.robot, usual.dt, usual.flight_knots)
+    return [dataclasses.replace(usual, dt=schedule.take_off_time / n) for n in KNOTS]
+
+
+def _row(subject: Subject, motion: str, settings: PlannerSettings, environment: Environment) -> Row:
+    request = usual_request(motion)
+    planner = Planner(subject.robot, settings=settings, cache=subject.cache, actuator_tolerance=np.inf)
+    planner.warm_up(request)
+    plan = planner.plan(request).plan
+    knots = int(np.sum(_in_take_off(plan)))
+    subject.progress(f"crocoddyl: {motion} with {knots} knots")
+    peer = environment.solve(problem(plan, subject.robot, settings, subject.repeats))
+    ours = summary([measure(planner, request) for _ in range(subject.repeats)])
+    runs = peer["runs"]
+    row = {
+        "motion": motion,
+        "knots": knots,
+        "flight_knots": settings.flight_knots,
+        "versions": peer["versions"],
+        "trials": len(runs),
+        "converged": sum(run["converged"] for run in runs),
+        **{name: percentiles(run[name] for run in runs) for name in ("solve_time_s", "iterations")},
+        **{name: max(run[name] for run in runs) for name in _WORTH},
+        "reduced": ours,
+    }
+    total = ours["total_time_s"]
+    row["speed_ratio"] = None if total is None else row["solve_time_s"]["p50"] / total["p50"]
+    return row
+
+
+def problem(plan: Plan, robot: Robot, settings: PlannerSettings, repeats: int) -> dict[str, Any]:
+    """Return the jump of a plan as ``crocoddyl_jump.py`` reads it: plain JSON types, SI units."""
+    law = robot.actuators
+    low, high = robot.planning_range
+    arrays = {
+        "q_start": plan.q[0],
+        "q_landing": plan.q[-1],
+        "contact": plan.contact[_in_take_off(plan)],
+        "armature": law.armature,
+        "torque_max": law.torque_max,
+        "volts_per_torque": law.volts_per_torque,
+        "volts_per_speed": law.volts_per_speed,
+        "bus_voltage": law.bus_voltage,
+        "joint_min": low,
+        "joint_max": high,
+    }
+    return {
+        **{name: array.tolist() for name, array in arrays.items()},
+        "urdf": str(robot.urdf),
+        "contact_frames": [point.frame for point in robot.contact_points],
+        "friction": robot.friction_coefficient,
+        "margin": settings.margin,
+        "dt": settings.dt,
+        "flight_time": plan.landing_time - plan.take_off_time,
+        "flight_knots": settings.flight_knots,
+        "tolerance": _TOLERANCE,
+        "max_iterations": _MAX_ITERATIONS,
+        "repeats": repeats,
+    }
+
+
+def _in_take_off(plan: Plan) -> np.ndarray:
+    """Return which knots ``(K,)`` have contacts."""
+    return plan.contact.any(axis=1)
+
+
+def _run(command: Sequence[str], text: str) -> str:
+    """Return what a command prints.
+
+    Raises:
+        PeerError: with the end of what it says when it fails.
+    """
+    ours = {"PYTHONPATH", "LD_LIBRARY_PATH"}  # another Pinocchio's, here
+    environment = {name: value for name, value in os.environ.items() if name not in ours}
+    try:
+        outcome = subprocess.run(command, input=text, capture_output=True, text=True, env=environment, check=False)
+    except OSError as error:
+        raise PeerError(f"{command[0]}: cannot be run ({error.strerror})") from None
+    if outcome.returncode != 0:
+        said = " ".join((outcome.stderr or outcome.stdout).split())[-300:]
+        raise PeerError(f"{Path(command[0]).name} ended with status {outcome.returncode}: {said}")
+    return outcome.stdout
