@@ -54,3 +54,11 @@ def test_what_cannot_be_measured_is_one_sentence(aerial, arguments, status, word
     assert ended.status == status
     assert words in ended.errors
     assert "Traceback" not in ended.errors
+
+
+def test_a_peer_that_is_asked_for_but_absent_is_one_sentence(aerial, monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    ended = aerial("bench", "planner", "--sections", "crocoddyl")
+    assert ended.status == 1
+    assert "--with-crocoddyl" in ended.errors
+    assert ended.errors.count("\n") == 1
