@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
-from aerial_evaluation.bench.crocoddyl import crocoddyl
 from aerial_evaluation.bench.goals import goals
 from aerial_evaluation.bench.literal import literal
+from aerial_evaluation.bench.peer import crocoddyl
 from aerial_evaluation.bench.profiles import profiles
 from aerial_evaluation.bench.samples import Row
 from aerial_evaluation.bench.scaling import knots, robots

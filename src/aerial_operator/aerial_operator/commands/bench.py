@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from aerial_evaluation.bench.crocoddyl import Environment
 from aerial_evaluation.bench.machine import machine
+from aerial_evaluation.bench.peer import Environment
 from aerial_evaluation.bench.planner import SECTIONS, measured
 from aerial_evaluation.bench.subject import Subject, motions_in_order
 from aerial_model.config import closest

@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from aerial_evaluation.bench.crocoddyl import REQUIREMENTS, Environment, PeerError, crocoddyl, problem
+from aerial_evaluation.bench.peer import REQUIREMENTS, Environment, PeerError, crocoddyl, problem
 from aerial_evaluation.bench.subject import Subject, usual_request
 from aerial_model.robot import JOINT_POSITION, Robot
 from aerial_planner.planner import Planner
@@ -96,3 +96,11 @@ def test_the_peer_finds_the_same_robot_in_the_problem(plan, planner, robot):
     q_j = plan.q[:, JOINT_POSITION]
     assert np.all(q_j[0] > low)
     assert np.all(q_j[0] < high)
+
+
+@pytest.mark.skipif(not Environment().is_made, reason="crocoddyl is not installed")
+def test_the_peer_solves_the_problem(plan, planner, robot):
+    (run,) = Environment().solve(problem(plan, robot, planner.settings, repeats=1))["runs"]
+    assert run["converged"]
+    assert run["landing_error_m"] < 0.01
+    assert run["peak_torque_ratio"] < 1.0
