@@ -60,7 +60,7 @@ def test_a_plan_for_a_fast_roll_starts_the_next_one(with_library):
 
 @pytest.mark.parametrize(
     "goal",
-    [jump(1.0, 0.0), jump(0.4, 0.0, yaw=1.5), MotionRequest(motion="front_flip"), jump(0.4, 0.0, warm_start=False)],
+    [jump(1.0, 0.0), jump(0.4, 0.0, yaw=2.5), MotionRequest(motion="front_flip"), jump(0.4, 0.0, warm_start=False)],
     ids=["far", "turned", "other contacts", "no warm start wanted"],
 )
 def test_what_is_not_near_or_not_wanted_starts_nothing(with_library, library, forward, goal):

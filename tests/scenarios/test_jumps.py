@@ -20,8 +20,8 @@ def planner(robot):
     return Planner(robot)
 
 
-def jump(robot, *displacement):
-    request = MotionRequest(motion="jump", displacement=np.array(displacement))
+def jump(robot, *displacement, **options):
+    request = MotionRequest(motion="jump", displacement=np.array(displacement), **options)
     return request.with_platform(robot) if displacement[2] else request
 
 
@@ -32,6 +32,12 @@ def jump(robot, *displacement):
 )
 def test_a_jump_lands(robot, planner, displacement):
     outcome = run(robot, jump(robot, *displacement), seed=1, planner=planner)
+    assert outcome.landing.failed == ()
+
+
+def test_a_jump_with_optimized_timing_lands(robot, planner):
+    outcome = run(robot, jump(robot, 0.8, 0.0, 0.0, optimize_timing=True), seed=1, planner=planner)
+    assert outcome.planning.plan.take_off_time < 0.35  # [s], instead of 0.4
     assert outcome.landing.failed == ()
 
 

@@ -10,7 +10,7 @@ import difflib
 import types
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_type_hints
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 import yaml
@@ -105,6 +105,8 @@ def _convert(kind: Any, value: Any, where: str) -> Any:
         return from_mapping(kind, value, where)
     if kind is np.ndarray:
         return frozen_array(value, where)
+    if get_origin(kind) is tuple:
+        return _converted_tuple(get_args(kind), value, where)
     if kind in (int, float):
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
             raise ConfigurationError(f"{where}: expected a finite number, found {value!r}")
@@ -114,6 +116,17 @@ def _convert(kind: Any, value: Any, where: str) -> Any:
     if kind in (str, bool) and not isinstance(value, kind):
         raise ConfigurationError(f"{where}: expected {kind.__name__}, found {value!r}")
     return tuple(value) if isinstance(value, list) else value
+
+
+def _converted_tuple(kinds: tuple[Any, ...], value: Any, where: str) -> tuple[Any, ...]:
+    """Return a list as the tuple a field is annotated with: ``tuple[T, ...]``, or of as many kinds as it has items."""
+    if not isinstance(value, list):
+        raise ConfigurationError(f"{where}: expected a list, found {value!r}")
+    if kinds[-1] is Ellipsis:
+        kinds = kinds[:1] * len(value)
+    if len(value) != len(kinds):
+        raise ConfigurationError(f"{where}: expected {len(kinds)} values, found {len(value)}")
+    return tuple(_convert(kind, item, f"{where}[{i}]") for i, (kind, item) in enumerate(zip(kinds, value, strict=True)))
 
 
 def frozen_array(value: Any, where: str = "array", shape: tuple[int, ...] | None = None) -> np.ndarray:

@@ -41,6 +41,7 @@ class MotionRequest:
     terrain: Terrain = field(default_factory=Terrain)
     variant: str = "AAKD*"
     warm_start: bool = True
+    optimize_timing: bool = False  # of the take-off's phases, within what the motion permits
     request_id: str = ""
 
     def __post_init__(self) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 from pathlib import Path
+from typing import Any
 
 from aerial_model.errors import RefusalError
 from aerial_model.request import MotionRequest
@@ -21,12 +22,24 @@ def add_planner_arguments(parser: argparse.ArgumentParser) -> None:
     planner.add_argument("--variant", metavar="KD|AAKD|AAKD*", default="AAKD*", help="of its dynamics (default: AAKD*)")
     planner.add_argument("--no-warm-start", action="store_true", help="skip the single-rigid-body stage")
     planner.add_argument(
+        "--optimize-timing", action="store_true", help="let the optimizer choose how long the take-off's phases last"
+    )
+    planner.add_argument(
         "--library",
         metavar="FOLDER",
         type=Path,
         help="start from the nearest plan in it, if one is near; add the new one",
     )
     planner.add_argument("--solver", choices=("fatrop", "ipopt"), default="fatrop", help="(default: fatrop)")
+
+
+def planner_choices(args: argparse.Namespace) -> dict[str, Any]:
+    """Return the fields of a request that the planner options set."""
+    return {
+        "variant": args.variant,
+        "warm_start": not args.no_warm_start,
+        "optimize_timing": args.optimize_timing,
+    }
 
 
 def warm_planner(args: argparse.Namespace, robot: Robot, request: MotionRequest) -> Planner:

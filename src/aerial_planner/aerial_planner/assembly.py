@@ -92,7 +92,8 @@ def assemble(
     K, n_c = len(q), robot.n_contacts
     contact, force = np.zeros((K, n_c), dtype=bool), np.zeros((K, n_c, 3))
     contact[:N], force[:N] = schedule.contact, take_off.force
-    time = np.concatenate([schedule.dt * np.arange(N + 1), schedule.take_off_time + flight.time[1:]])
+    take_off_time = np.concatenate([[0.0], np.cumsum(take_off.dt)])
+    time = np.concatenate([take_off_time, take_off_time[-1] + flight.time[1:]])
     return Plan(
         motion=request.motion,
         robot=robot.name,
@@ -106,7 +107,7 @@ def assemble(
         foot_position=np.array([robot.contact_positions(q_k) for q_k in q]),
         force=force,
         contact=contact,
-        take_off_time=schedule.take_off_time,
+        take_off_time=float(take_off_time[-1]),
         landing_time=float(time[-1]),
         landing_joint_position=reference.landing_joint_position,
         landing_com_height=reference.landing_com_height,

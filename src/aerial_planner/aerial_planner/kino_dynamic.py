@@ -9,6 +9,9 @@ by construction; accelerations and α̇ are expressions. What stays are the mome
     lift-off knot   x as above,   u = [ω in flight, ω and q̇_j on the ground, the flight time T]
     flight knot     x = [α, quaternion, q_j, T],   u = [ω]
 
+With timing optimized, x has the factor by which the phase's time steps differ from the schedule's, constant but for the
+last knot of a phase, whose u sets that of the next; the cost of a knot is weighted with it, as an integral's would be.
+
 The rates of the knot before give the joint accelerations: the torque limits then hold for −Jᵀf *and* the inertia of the
 legs, whose mass matrix is taken at the home pose. With (3.14) alone, which neglects it, unloaded legs whip around for
 free and the last force before lift-off becomes an impulse that no leg could follow.
@@ -59,11 +62,14 @@ class KinoDynamic:
         variant: Variant,
         options: SolverOptions,
         library: FunctionLibrary | None = None,
+        *,
+        timed: bool = False,
     ) -> None:
         self.robot = robot
         self.model = model
         self.settings = settings
         self.variant = variant
+        self.timed = timed
         self.options = options
         self.library = library
         self._joint_inertia = joint_inertia(robot)
@@ -83,7 +89,7 @@ class KinoDynamic:
 
     def problem(self, schedule: Schedule) -> Problem:
         """Return the problem of a schedule, built at its first use."""
-        key = schedule.contact.tobytes() + bytes([schedule.flight_knots])
+        key = schedule.contact.tobytes() + schedule.phase.tobytes() + bytes([schedule.flight_knots])
         if key not in self._problems:
             self._problems[key] = Problem(self.kinds(schedule), self.options, self.library)
         return self._problems[key]
@@ -91,21 +97,25 @@ class KinoDynamic:
     def kinds(self, schedule: Schedule) -> list[StageKind]:
         """Return the stage kind of each knot."""
         sets = _contact_sets(schedule)
-        kinds = [self._take_off_kind(*pair) for pair in sets]
+        ends = np.append(np.diff(schedule.phase) != 0, False)
+        kinds = [self._take_off_kind(*pair, ends_phase=bool(end)) for pair, end in zip(sets, ends, strict=True)]
         kinds.append(self._lift_off_kind(sets[-1][1]))
         kinds += [self._flight_kind()] * (schedule.flight_knots - 1)
         return [*kinds, self._touchdown_kind()]
 
     # --- stage kinds: variables, objective, dynamics, constraints ---------------------------------------------------
 
-    def _take_off_kind(self, touching: tuple[bool, ...] | None, loaded: tuple[bool, ...]) -> StageKind:
+    def _take_off_kind(
+        self, touching: tuple[bool, ...] | None, loaded: tuple[bool, ...], *, ends_phase: bool
+    ) -> StageKind:
         """Return the knot whose ``touching`` contacts are held and ``loaded`` ones push; touching None: the first knot."""
-        key = ("take_off", touching, loaded)
+        ends_phase = ends_phase and self.timed  # else it makes no difference
+        key = ("take_off", touching, loaded, ends_phase)
         if key in self._kinds:
             return self._kinds[key]
         robot, settings = self.robot, self.settings
         n_c = robot.n_contacts
-        s = TakeOffKnot(robot, self.model, loaded)
+        s = TakeOffKnot(robot, self.model, loaded, timed=self.timed, ends_phase=ends_phase)
 
         dr = s.r - s.r_ref
         dv = s.rdot - s.rdot_ref
@@ -122,11 +132,13 @@ class KinoDynamic:
             + w.joint_acceleration * ca.sumsqr(s.ddq_j)
             + w.force * ca.sumsqr(s.f)
         )
+        if self.timed:
+            cost *= s.stretch  # as an integral's share: else the longest time would be the cheapest
 
         rows = Rows()
         R = s.R
         if touching is None:
-            rows.equal("start", s.x - s.x_0)
+            rows.equal("start", s.motion - s.x_0)
         else:
             feet = world_feet(self.model, s)
             slopes = link_slopes(robot, self.model, s.q_j, s.R)
@@ -145,7 +157,7 @@ class KinoDynamic:
 
         following = s.step(self.model, robot.mass)
         kind = rows.stage(
-            f"take_off_{contact_bits(touching)}_{contact_bits(loaded)}_{self.variant.name}",
+            f"take_off_{contact_bits(touching)}_{contact_bits(loaded)}_{self._name}{'_end' if ends_phase else ''}",
             s.x,
             s.u,
             s.p,
@@ -154,6 +166,10 @@ class KinoDynamic:
         )
         self._kinds[key] = kind
         return kind
+
+    @property
+    def _name(self) -> str:
+        return self.variant.name + ("_timed" if self.timed else "")
 
     def _actuator_rows(self, rows: Rows, s: TakeOffKnot, loaded: tuple[bool, ...]) -> None:
         """Add torque and voltage limits (3.11b, c) of all joints, with τ of (3.14) plus the inertia of the joints."""
@@ -181,7 +197,7 @@ class KinoDynamic:
         if key in self._kinds:
             return self._kinds[key]
         robot = self.robot
-        s = TakeOffKnot(robot, self.model, (False,) * robot.n_contacts, in_flight=True)
+        s = TakeOffKnot(robot, self.model, (False,) * robot.n_contacts, in_flight=True, timed=self.timed)
         rows = Rows()
         feet = world_feet(self.model, s)
         for i in np.flatnonzero(touching):
@@ -205,7 +221,7 @@ class KinoDynamic:
             + w.joint_acceleration * ca.sumsqr(s.ddq_j)
             + w.flight_time * (s.flight_time - s.flight_time_ref) ** 2
         )
-        kind = rows.stage(f"lift_off_{contact_bits(touching)}_{self.variant.name}", s.x, s.u, s.p, cost, flight.step())
+        kind = rows.stage(f"lift_off_{contact_bits(touching)}_{self._name}", s.x, s.u, s.p, cost, flight.step())
         self._kinds[key] = kind
         return kind
 
@@ -244,16 +260,18 @@ class KinoDynamic:
         robot, settings = self.robot, self.settings
         n, N, M = robot.n_joints, len(schedule.contact), schedule.flight_knots
         low, high = robot.planning_range
-        in_range = {
-            "x_min": np.concatenate([np.full(13, -np.inf), low, np.full(n, -np.inf)]),
-            "x_max": np.concatenate([np.full(13, np.inf), high, np.full(n, np.inf)]),
-        }
+        x_min = np.tile(np.concatenate([np.full(13, -np.inf), low, np.full(n, -np.inf)]), (N + 1, 1))
+        x_max = np.tile(np.concatenate([np.full(13, np.inf), high, np.full(n, np.inf)]), (N + 1, 1))
+        x_min[0], x_max[0] = -np.inf, np.inf  # where the robot stands is given
         aware = self.variant is not Variant.KD
         speed = settings.speed_margin * robot.actuators.no_load_speed if aware else np.full(n, np.inf)  # (3.11a)
         before = np.vstack([np.zeros(n), guess.joint_velocity[:-1]])
         x = np.hstack(
             [guess.com, guess.com_velocity, guess.angular_momentum, guess.orientation, guess.joint_position, before]
         )
+        stretch, least, greatest = self._stretches(schedule, guess)  # (N+1, 0 or 1) each
+        x, x_min, x_max = np.hstack([x, stretch]), np.hstack([x_min, least]), np.hstack([x_max, greatest])
+        ends = np.append(np.diff(schedule.phase) != 0, False)
         foot_ref = reference.foot_position.ravel()
         path = reference.flight_path
         stages = []
@@ -265,14 +283,18 @@ class KinoDynamic:
             u = [guess.angular_velocity[k], guess.joint_velocity[k], guess.force[k][loaded].ravel()]
             force_min = np.tile([-np.inf, -np.inf, settings.force_min], n_f)
             force_max = np.tile([np.inf, np.inf, settings.force_max], n_f)
+            u_min, u_max = [np.full(3, -np.inf), -speed, force_min], [np.full(3, np.inf), speed, force_max]
+            if ends[k]:
+                u, u_min, u_max = [*u, stretch[k + 1]], [*u_min, least[k + 1]], [*u_max, greatest[k + 1]]
             stages.append(
-                StageData.free(
+                StageData(
                     p=np.concatenate(p),
                     x=x[k],
+                    x_min=x_min[k],
+                    x_max=x_max[k],
                     u=np.concatenate(u),
-                    u_min=np.concatenate([np.full(3, -np.inf), -speed, force_min]),
-                    u_max=np.concatenate([np.full(3, np.inf), speed, force_max]),
-                    **({} if k == 0 else in_range),  # where the robot stands is given
+                    u_min=np.concatenate(u_min),
+                    u_max=np.concatenate(u_max),
                 )
             )
         p = [
@@ -288,7 +310,15 @@ class KinoDynamic:
         u_min = np.concatenate([np.full(6, -np.inf), -speed, [shortest]])
         u_max = np.concatenate([np.full(6, np.inf), speed, [longest]])
         stages.append(
-            StageData.free(p=np.concatenate(p), x=x[N], u=np.concatenate(u), u_min=u_min, u_max=u_max, **in_range)
+            StageData(
+                p=np.concatenate(p),
+                x=x[N],
+                x_min=x_min[N],
+                x_max=x_max[N],
+                u=np.concatenate(u),
+                u_min=u_min,
+                u_max=u_max,
+            )
         )
         flight = np.hstack([guess.flight_orientation, guess.flight_joint_position])
         for k in range(1, M + 1):
@@ -299,15 +329,24 @@ class KinoDynamic:
                 stages.append(StageData.free(p=schedule.landing_orientation, x=x_k))
         return stages
 
+    def _stretches(self, schedule: Schedule, guess: TakeOffTrajectory) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return guess and bounds of the factor of the time steps at each take-off knot; without columns if fixed."""
+        if not self.timed:
+            return (np.zeros((len(schedule.contact) + 1, 0)),) * 3
+        least, greatest = np.vstack([schedule.stretch_range, schedule.stretch_range[-1:]]).T[..., None]
+        stretch = np.append(guess.dt, guess.dt[-1])[:, None] / schedule.dt
+        return np.clip(stretch, least, greatest), least, greatest
+
     def _trajectory(self, schedule: Schedule, solution: Solution) -> TakeOffTrajectory:
         n = self.robot.n_joints
         N = len(schedule.contact)
         x = np.array(solution.x[: N + 1])
         force = np.zeros((N, self.robot.n_contacts, 3))
         for k in range(N):
-            force[k][schedule.contact[k]] = solution.u[k][3 + n :].reshape(-1, 3)
+            force[k][schedule.contact[k]] = solution.u[k][3 + n :][: 3 * schedule.contact[k].sum()].reshape(-1, 3)
         flight = np.array([x[N][6 : 13 + n], *(x_k[:-1] for x_k in solution.x[N + 1 :])])
         return TakeOffTrajectory(
+            dt=schedule.dt * (x[:N, -1] if self.timed else np.ones(N)),
             com=x[:, :3],
             com_velocity=x[:, 3:6],
             angular_momentum=x[:, 6:9],

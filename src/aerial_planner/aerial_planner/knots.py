@@ -22,9 +22,27 @@ def joint_inertia(robot: Robot) -> np.ndarray:
 
 
 class TakeOffKnot:
-    """Symbols of a take-off knot and its Euler step (3.5, 3.6)."""
+    """Symbols of a take-off knot and its Euler step (3.5, 3.6).
 
-    def __init__(self, robot: Robot, model: BaseFrameModel, loaded: Sequence[bool], *, in_flight: bool = False) -> None:
+    Args:
+        robot: the robot.
+        model: its expressions.
+        loaded: which contacts push.
+        in_flight: the lift-off knot.
+        timed: the state has the factor by which all time steps of this phase are longer than the schedule's.
+        ends_phase: the control has that of the next phase.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        model: BaseFrameModel,
+        loaded: Sequence[bool],
+        *,
+        in_flight: bool = False,
+        timed: bool = False,
+        ends_phase: bool = False,
+    ) -> None:
         n, n_c = robot.n_joints, robot.n_contacts
         self._model = model
         self.r, self.rdot, self.alpha = (ca.SX.sym(name, 3) for name in ("r", "rdot", "alpha"))
@@ -33,30 +51,39 @@ class TakeOffKnot:
         self.force = {int(i): ca.SX.sym(f"f_{i}", 3) for i in np.flatnonzero(loaded)}
         self.f = ca.vertcat(*self.force.values())
         self.dq_before = ca.SX.sym("dq_before", n)
-        self.x = ca.vertcat(self.r, self.rdot, self.alpha, self.quaternion, self.q_j, self.dq_before)
+        self.motion = ca.vertcat(self.r, self.rdot, self.alpha, self.quaternion, self.q_j, self.dq_before)
+        self.stretch = ca.SX.sym("stretch", int(timed))
+        self.next_stretch = ca.SX.sym("next_stretch") if timed and ends_phase else self.stretch
+        self.x = ca.vertcat(self.motion, self.stretch)
+        self.nominal_dt = ca.SX.sym("dt")
+        self.dt = self.nominal_dt * self.stretch if timed else self.nominal_dt
+        self.ddq_j = (self.dq_j - self.dq_before) / self.dt
         self.foot_ref = ca.SX.sym("foot_ref", 3, n_c)
         if in_flight:
             self.omega_ground = ca.SX.sym("omega_ground", 3)
-            self.dt = ca.SX.sym("dt")
-            self.ddq_j = (self.dq_j - self.dq_before) / self.dt
             self.flight_time, self.flight_time_ref = ca.SX.sym("T"), ca.SX.sym("T_ref")
             self.u = ca.vertcat(self.omega, self.omega_ground, self.dq_j, self.flight_time)
             self.landing_lead = ca.SX.sym("lead")
             self.landing_com = ca.SX.sym("landing_com", 3)
             self.flight_p = ca.SX.sym("flight_p", FlightKnot.n_p(robot))
             self.p = ca.vertcat(
-                self.dt, ca.vec(self.foot_ref), self.flight_time_ref, self.landing_lead, self.landing_com, self.flight_p
+                self.nominal_dt,
+                ca.vec(self.foot_ref),
+                self.flight_time_ref,
+                self.landing_lead,
+                self.landing_com,
+                self.flight_p,
             )
             return
         self.u = ca.vertcat(self.omega, self.dq_j, self.f)
-        self.dt = ca.SX.sym("dt")
-        self.ddq_j = (self.dq_j - self.dq_before) / self.dt
+        if timed and ends_phase:
+            self.u = ca.vertcat(self.u, self.next_stretch)
         self.r_ref, self.rdot_ref = ca.SX.sym("r_ref", 3), ca.SX.sym("rdot_ref", 3)
         self.quaternion_ref, self.q_j_ref = ca.SX.sym("quat_ref", 4), ca.SX.sym("q_j_ref", n)
         self.q_j_frozen = ca.SX.sym("q_j_frozen", n)
-        self.x_0 = ca.SX.sym("x_0", self.x.numel())
+        self.x_0 = ca.SX.sym("x_0", self.motion.numel())
         self.p = ca.vertcat(
-            self.dt,
+            self.nominal_dt,
             self.r_ref,
             self.rdot_ref,
             self.quaternion_ref,
@@ -86,6 +113,7 @@ class TakeOffKnot:
             quaternion_product(self.quaternion, quaternion_step(self.omega, self.dt)),
             self.q_j + self.dq_j * self.dt,
             self.dq_j,
+            self.next_stretch,
         )
 
 

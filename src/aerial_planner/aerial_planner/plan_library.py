@@ -24,7 +24,7 @@ from aerial_planner.reference import FlightPath, Reference
 from aerial_planner.schedule import Schedule
 from aerial_planner.trajectory import TakeOffTrajectory
 
-_NEAR = 1.0  # distance up to which a stored plan is the better start
+_NEAR = 2.0  # distance up to which a stored plan is the better start, see decision 7
 _SPACING = 0.1  # distance to a stored plan below which another one adds nothing
 _SUFFIX = ".npz"
 _SAME_TIME = 1e-6  # [s]
@@ -140,19 +140,20 @@ def _place(landing: np.ndarray, turn: np.ndarray, start: np.ndarray, height: flo
 def _take_off(plan: Plan, N: int, path: FlightPath) -> TakeOffTrajectory:
     """Return the take-off of a plan, with rates that move its knots from one to the next as the optimizer's do."""
     knots = slice(0, N + 1)
-    dt = np.diff(plan.time[knots])[:, None]
+    dt = np.diff(plan.time[knots])
     quaternion, q_j = plan.q[knots, BASE_ORIENTATION], plan.q[knots, JOINT_POSITION]
     turn = rotation.log(rotation.multiply(rotation.conjugate(quaternion[:-1]), quaternion[1:]))
     M = len(path.fraction)
     samples = [plan.sample(time) for time in np.linspace(plan.take_off_time, plan.landing_time, M + 1)]
     return TakeOffTrajectory(
+        dt=dt,
         com=plan.com[knots],
         com_velocity=plan.com_velocity[knots],
         angular_momentum=plan.angular_momentum[knots],
         orientation=quaternion,
         joint_position=q_j,
-        angular_velocity=np.vstack([turn / dt, plan.v[N, BASE_ANGULAR]]),
-        joint_velocity=np.vstack([np.diff(q_j, axis=0) / dt, plan.v[N, JOINT_VELOCITY]]),
+        angular_velocity=np.vstack([turn / dt[:, None], plan.v[N, BASE_ANGULAR]]),
+        joint_velocity=np.vstack([np.diff(q_j, axis=0) / dt[:, None], plan.v[N, JOINT_VELOCITY]]),
         force=plan.force[:N],
         flight_time=plan.landing_time - plan.take_off_time,
         flight_orientation=np.array([sample.q[BASE_ORIENTATION] for sample in samples]),

@@ -49,6 +49,7 @@ class PlanReport:
     robot: str
     variant: str
     warm_start: bool
+    optimize_timing: bool
     started_from: str  # "library", "srbm" or "reference"; empty if nothing was optimized
     solver: str
     success: bool
@@ -56,6 +57,7 @@ class PlanReport:
     solve_time_s: float
     srbm_time_s: float
     iterations: int
+    cost: float | None
     max_violation: float | None
     peak_torque_ratio: float | None
     peak_voltage_ratio: float | None
@@ -125,7 +127,7 @@ class Planner:
         self._ik = InverseKinematics(robot, self._model)
         self._srbm = SingleRigidBody(robot, self._model, self._ik, self.settings, self.options, self._library)
         self._collisions = CollisionModel(robot)
-        self._kino_dynamic: dict[Variant, KinoDynamic] = {}
+        self._kino_dynamic: dict[tuple[Variant, bool], KinoDynamic] = {}
 
     def plan(
         self, request: MotionRequest, start: Estimate | None = None, progress: Progress | None = None
@@ -151,7 +153,7 @@ class Planner:
         """Build the problems of a request's schedule, so that its first plan is as fast as later ones."""
         schedule = self._schedule(request, load_motion(request.motion))
         self._srbm.problem(schedule)
-        self._stage(self._variant(request)).problem(schedule)
+        self._stage(request).problem(schedule)
 
     def compile(self, requests: Iterable[MotionRequest], progress: Callable[[str], None]) -> int:
         """Compile what plans of these requests evaluate, unless it is there; return how many stage kinds that were.
@@ -169,7 +171,7 @@ class Planner:
         kinds: dict[str, StageKind] = {}
         for request in requests:
             schedule = self._schedule(request, load_motion(request.motion))
-            for stage in (self._srbm, self._stage(self._variant(request))):
+            for stage in (self._srbm, self._stage(request)):
                 kinds.update((kind.name, kind) for kind in stage.kinds(schedule))
         compiled = 0
         for name, kind in kinds.items():
@@ -181,7 +183,7 @@ class Planner:
     def _plan(
         self, request: MotionRequest, start: Estimate | None, progress: Progress, clock: _Clock
     ) -> PlanningResult:
-        variant = self._variant(request)
+        stage = self._stage(request)
         motion = load_motion(request.motion)
         q_start = self._start_configuration(start)
         least_rise = 0.0
@@ -189,7 +191,7 @@ class Planner:
             schedule = self._schedule(request, motion, least_rise)
             reference = body_reference(schedule, q_start, self.robot, self._model, self._ik, self.settings)
             screen(request, schedule, reference, self.robot)
-            take_off, solution = self._take_off(request, variant, schedule, reference, progress, clock)
+            take_off, solution = self._take_off(request, stage, schedule, reference, progress, clock)
             plan = assemble(request, self.robot, self._model, schedule, reference, take_off)
             use = actuator_use(plan, self.robot)
             check(plan, schedule, solution, use, self.robot, self.actuator_tolerance)
@@ -222,7 +224,7 @@ class Planner:
     def _take_off(
         self,
         request: MotionRequest,
-        variant: Variant,
+        stage: KinoDynamic,
         schedule: Schedule,
         reference: Reference,
         progress: Progress,
@@ -232,12 +234,12 @@ class Planner:
         stored = self.plans.nearest(schedule, reference) if self.plans is not None and request.warm_start else None
         if stored is not None:
             clock.started_from = "library"
-            take_off, solution = self._optimize(variant, schedule, reference, stored, progress, clock)
+            take_off, solution = self._optimize(stage, schedule, reference, stored, progress, clock)
             if solution.max_violation <= VIOLATION_TOLERANCE:
                 return take_off, solution
         guess = self._guess(request, schedule, reference, progress, clock)
         clock.started_from = "srbm" if request.warm_start else "reference"
-        return self._optimize(variant, schedule, reference, guess, progress, clock)
+        return self._optimize(stage, schedule, reference, guess, progress, clock)
 
     def _guess(
         self, request: MotionRequest, schedule: Schedule, reference: Reference, progress: Progress, clock: _Clock
@@ -261,7 +263,7 @@ class Planner:
 
     def _optimize(
         self,
-        variant: Variant,
+        stage: KinoDynamic,
         schedule: Schedule,
         reference: Reference,
         guess: TakeOffTrajectory,
@@ -269,7 +271,7 @@ class Planner:
         clock: _Clock,
     ) -> tuple[TakeOffTrajectory, Solution]:
         began = time.perf_counter()
-        take_off, solution = self._stage(variant).solve(schedule, reference, guess)
+        take_off, solution = stage.solve(schedule, reference, guess)
         clock.solve += time.perf_counter() - began
         clock.iterations += solution.iterations
         progress("kino_dynamic", clock.iterations, solution.max_violation)
@@ -279,12 +281,14 @@ class Planner:
         settings = self.settings
         return contact_schedule(request, motion, self.robot, settings.dt, settings.flight_knots, least_rise)
 
-    def _stage(self, variant: Variant) -> KinoDynamic:
-        if variant not in self._kino_dynamic:
-            self._kino_dynamic[variant] = KinoDynamic(
-                self.robot, self._model, self.settings, variant, self.options, self._library
+    def _stage(self, request: MotionRequest) -> KinoDynamic:
+        """Return the kino-dynamic stage of the request's variant, with or without the timing optimized."""
+        key = self._variant(request), request.optimize_timing
+        if key not in self._kino_dynamic:
+            self._kino_dynamic[key] = KinoDynamic(
+                self.robot, self._model, self.settings, key[0], self.options, self._library, timed=key[1]
             )
-        return self._kino_dynamic[variant]
+        return self._kino_dynamic[key]
 
     def _variant(self, request: MotionRequest) -> Variant:
         try:
@@ -323,6 +327,7 @@ class Planner:
             robot=self.robot.name,
             variant=request.variant,
             warm_start=request.warm_start,
+            optimize_timing=request.optimize_timing,
             started_from=clock.started_from,
             solver=self.options.solver,
             success=plan is not None,
@@ -330,6 +335,7 @@ class Planner:
             solve_time_s=clock.solve,
             srbm_time_s=clock.srbm,
             iterations=clock.iterations,
+            cost=None if solution is None else solution.cost,
             max_violation=None if solution is None else solution.max_violation,
             peak_torque_ratio=None if use is None else float(use.torque_ratio.max()),
             peak_voltage_ratio=None if use is None else float(use.voltage_ratio.max()),

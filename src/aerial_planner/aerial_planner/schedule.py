@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -40,11 +41,25 @@ class RotationRule:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Phase:
+    """A part of the take-off with the same contacts."""
+
+    contacts: Any  # `all`, names, or a mapping of the sense of the turn (positive, negative) to either
+    duration: float  # [s]
+    duration_range: tuple[float, float] | None = None  # that an optimized duration must stay in [s]; None: fixed
+
+    def __post_init__(self) -> None:
+        least, greatest = self.duration_range or (self.duration, self.duration)
+        if not 0 < least <= self.duration <= greatest:
+            raise ValueError(f"expected 0 < least ≤ duration ≤ greatest, found {least}, {self.duration}, {greatest}")
+
+
+@dataclass(frozen=True, kw_only=True)
 class Motion:
     """One motion as its YAML file says."""
 
     summary: str
-    take_off: tuple  # of mappings with `contacts` (all, or names) and `duration` [s]
+    take_off: tuple[Phase, ...]
     flight: FlightRule
     goal: tuple  # of names of the request's numbers that may be set
     rotation: RotationRule | None = None  # a motion that turns
@@ -57,6 +72,8 @@ class Schedule:
 
     dt: float  # of the take-off knots [s]
     contact: np.ndarray  # (N, n_c) bool: contact on [t_k, t_k+1), all of the take-off
+    phase: np.ndarray  # (N,) int: which phase of the take-off
+    stretch_range: np.ndarray  # (N, 2) least and greatest factor of dt, one for all of a phase, if timing is optimized
     flight_time: float  # that the optimizer should stay near [s]
     flight_time_range: tuple[float, float]  # that it must stay in [s]
     flight_knots: int  # intervals the flight is integrated with
@@ -129,11 +146,10 @@ def contact_schedule(
     _check_goal(request, motion)
     rule = motion.rotation
     turns = 0.0 if rule is None else rule.turns if request.rotation is None else request.rotation
-    rows = []
     names = [point.name for point in robot.contact_points]
-    for phase in motion.take_off:
-        mask = _contacts(phase["contacts"], names, turns)
-        rows += [mask] * max(1, round(float(phase["duration"]) / dt))
+    masks = np.array([_contacts(phase.contacts, names, turns) for phase in motion.take_off])
+    knots = [max(1, round(phase.duration / dt)) for phase in motion.take_off]
+    ranges = [phase.duration_range or (n * dt, n * dt) for phase, n in zip(motion.take_off, knots, strict=True)]
     displacement = request.displacement if np.any(request.displacement) else motion.displacement
     distance = float(np.linalg.norm(displacement[:2]))
     height = float(displacement[2])
@@ -145,7 +161,9 @@ def contact_schedule(
         turn = turn + 2 * np.pi * turns * rule.axis
     return Schedule(
         dt=dt,
-        contact=np.array(rows),
+        contact=np.repeat(masks, knots, axis=0),
+        phase=np.repeat(np.arange(len(knots)), knots),
+        stretch_range=np.repeat(np.array(ranges) / (dt * np.array(knots)[:, None]), knots, axis=0),
         flight_time=nominal,
         flight_time_range=(shortest, _FLIGHT_TIME_STRETCH * nominal),
         flight_knots=flight_knots,
@@ -174,12 +192,12 @@ def _check_goal(request: MotionRequest, motion: Motion) -> None:
             )
 
 
-def _contacts(entry: object, names: list[str], turns: float) -> np.ndarray:
+def _contacts(entry: Any, names: list[str], turns: float) -> np.ndarray:
     """Return the mask ``(n_c,)`` of a phase's contacts; an entry may differ with the sense of the turn."""
     if isinstance(entry, dict):
         entry = entry["positive" if turns >= 0 else "negative"]
     if entry == "all":
         return np.ones(len(names), dtype=bool)
-    if not isinstance(entry, list) or any(name not in names for name in entry):
+    if not isinstance(entry, (list, tuple)) or any(name not in names for name in entry):
         raise ConfigurationError(f"contacts of a take-off phase: expected 'all' or some of {names}, found {entry!r}")
     return np.array([name in entry for name in names])

@@ -71,6 +71,7 @@ class SingleRigidBody:
         share = np.array([0.0, 0.0, self.robot.mass * GRAVITY])
         pose = reference.joint_position[-1]
         return TakeOffTrajectory(
+            dt=np.full(N, schedule.dt),
             com=reference.com,
             com_velocity=reference.com_velocity,
             angular_momentum=reference.angular_momentum,
@@ -232,6 +233,7 @@ class SingleRigidBody:
         flight_omega = np.einsum("ab,kcb,kc->ka", self.inertia_inverse, flight_R.transpose(0, 2, 1), flight[:, :3])
         rates = np.diff(q_j, axis=0) / schedule.dt
         return TakeOffTrajectory(
+            dt=np.full(N, schedule.dt),
             com=com,
             com_velocity=x[:, 3:6],
             angular_momentum=alpha,

@@ -296,6 +296,7 @@ class LiteralProblem:
             return np.atleast_2d(solution.value(variable)).T
 
         return TakeOffTrajectory(
+            dt=np.full(self.N, self.schedule.dt),
             com=rows(self.r),
             com_velocity=rows(self.rdot),
             angular_momentum=rows(self.alpha),

@@ -11,6 +11,7 @@ import numpy as np
 class TakeOffTrajectory:
     """N + 1 take-off knots and M + 1 flight knots, in S (see ``aerial_model.plan``); SI units."""
 
+    dt: np.ndarray  # (N,) from each knot to the next [s]
     com: np.ndarray  # (N+1, 3)
     com_velocity: np.ndarray  # (N+1, 3)
     angular_momentum: np.ndarray  # (N+1, 3)

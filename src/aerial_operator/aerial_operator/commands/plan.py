@@ -10,7 +10,7 @@ from aerial_model.plan_file import save_plan
 from aerial_model.robot import Robot
 from aerial_operator.console import Report, pairs, percent, say
 from aerial_operator.goal import add_goal_arguments, request_from
-from aerial_operator.planning import add_planner_arguments, warm_planner
+from aerial_operator.planning import add_planner_arguments, planner_choices, warm_planner
 from aerial_planner.planner import PlanReport
 
 _STARTS = {"library": "library", "srbm": "warm", "reference": "cold"}
@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> Report:
     """Plan on a warm planner: the building of its problems, once per process, is not counted."""
     robot = Robot.load(args.robot)
-    request = request_from(args, robot, variant=args.variant, warm_start=not args.no_warm_start)
+    request = request_from(args, robot, **planner_choices(args))
     planner = warm_planner(args, robot, request)
     try:
         result = planner.plan(request)

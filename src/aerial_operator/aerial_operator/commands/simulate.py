@@ -12,7 +12,7 @@ from aerial_model.robot import Robot
 from aerial_operator.console import Report, pairs, percent, say
 from aerial_operator.goal import add_goal_arguments, request_from
 from aerial_operator.pictures import save_picture
-from aerial_operator.planning import add_planner_arguments, warm_planner
+from aerial_operator.planning import add_planner_arguments, planner_choices, warm_planner
 from aerial_operator.settings import add_setting_argument, with_settings
 
 
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> Report:
     """Plan, execute, judge."""
     robot = with_settings(Robot.load(args.robot), args.settings)
-    request = request_from(args, robot, variant=args.variant, warm_start=not args.no_warm_start)
+    request = request_from(args, robot, **planner_choices(args))
     planner = warm_planner(args, robot, request)
     try:
         outcome = run_closed_loop(robot, request, seed=args.seed, noise=args.noise, planner=planner)
