@@ -12,14 +12,17 @@ from typing import Any
 import numpy as np
 
 from aerial_evaluation.landing import OBSERVE_TIME, Landing, Tick, judge
+from aerial_model.plan import Plan
 from aerial_model.request import MotionRequest
 from aerial_model.robot import Robot
 from aerial_model.terrain import Terrain
 from aerial_planner.planner import Planner, PlanningResult, Progress
-from aerial_sim.simulation import Simulation
+from aerial_sim.conditions import Conditions
+from aerial_sim.simulation import AS_EXPECTED, Simulation
 from aerial_wbic.controller import Controller
 
 STAND_TIME = 0.5  # before the plan is asked for [s]
+PUSH_TIME = 0.02  # that the push at the apex lasts [s]
 MICRO = 1e6  # microseconds in a second
 
 
@@ -93,6 +96,7 @@ def run(
     *,
     seed: int = 0,
     noise: str = "nominal",
+    conditions: Conditions = AS_EXPECTED,
     planner: Planner | None = None,
     progress: Progress | None = None,
 ) -> Outcome:
@@ -103,6 +107,7 @@ def run(
         request: the motion, its goal and its terrain.
         seed: of the simulation.
         noise: ``"nominal"`` or ``"off"``.
+        conditions: of the world.
         planner: for this robot, to reuse one that is warm.
         progress: handed to the planner.
 
@@ -110,7 +115,7 @@ def run(
         RefusalError: if planner or controller refuse.
     """
     planner = planner or Planner(robot)
-    simulation = Simulation(robot, seed=seed, noise=noise)
+    simulation = Simulation(robot, seed=seed, noise=noise, conditions=conditions)
     if request.terrain.floor < 0:
         simulation.set_terrain(terrain_in_world(robot, request.terrain, simulation.state()[0]))
         simulation.reset(seed)  # onto the platform it is to jump off
@@ -122,9 +127,17 @@ def run(
     origin, heading = robot.start_frame(simulation.state()[0])
     start_time = simulation.time
     loop.controller.accept(planning.plan)
-    loop.advance(planning.plan.landing_time + OBSERVE_TIME)
+    _execute(loop, planning.plan, conditions, seed)
     return Outcome(
-        landing=judge(robot, planning.plan, origin=origin, heading=heading, start_time=start_time, ticks=loop.ticks),
+        landing=judge(
+            robot,
+            planning.plan,
+            origin=origin,
+            heading=heading,
+            start_time=start_time,
+            ticks=loop.ticks,
+            ground_rise=conditions.ground_rise,
+        ),
         planning=planning,
         terrain=simulation.terrain,
         ticks=loop.ticks,
@@ -134,6 +147,16 @@ def run(
         seed=seed,
         noise=noise,
     )
+
+
+def _execute(loop: Loop, plan: Plan, conditions: Conditions, seed: int) -> None:
+    """Run a plan that was accepted, and what comes between, until its landing has been observed."""
+    apex = (plan.take_off_time + plan.landing_time) / 2
+    loop.advance(apex)
+    direction = np.random.default_rng([seed, 2]).uniform(-np.pi, np.pi)
+    force = conditions.push / PUSH_TIME * np.array([np.cos(direction), np.sin(direction), 0.0])
+    loop.simulation.disturb(force, PUSH_TIME, ground_rise=conditions.ground_rise)
+    loop.advance(plan.landing_time + OBSERVE_TIME - apex)
 
 
 def terrain_in_world(robot: Robot, terrain: Terrain, q: np.ndarray) -> Terrain:

@@ -79,7 +79,14 @@ class Landing:
 
 
 def judge(
-    robot: Robot, plan: Plan, *, origin: np.ndarray, heading: float, start_time: float, ticks: list[Tick]
+    robot: Robot,
+    plan: Plan,
+    *,
+    origin: np.ndarray,
+    heading: float,
+    start_time: float,
+    ticks: list[Tick],
+    ground_rise: float = 0.0,
 ) -> Landing:
     """Return the verdict on one motion.
 
@@ -91,6 +98,7 @@ def judge(
         start_time: when the plan's time 0 was [s].
         ticks: every control period from the start of the motion to ``OBSERVE_TIME`` after its planned landing; what
             lies before or after is left out.
+        ground_rise: of the landing surface over where the plan has it [m].
 
     Raises:
         ValueError: if the ticks do not cover that time.
@@ -107,7 +115,7 @@ def judge(
         touchdown = int(np.searchsorted([truth.time for truth in truths], landing))
     turned = _accumulated_rotation(truths[: touchdown + 1])
     com_height = np.array([_centre_of_mass(robot, truth.q)[2] for truth in truths])
-    height = float(com_height[-1] - placed.landing_support_centre[2])
+    height = float(com_height[-1] - placed.landing_support_centre[2] - ground_rise)
     support = robot.contact_positions(final.q).mean(axis=0)
     position_error = float(np.linalg.norm((support - placed.landing_support_centre)[:2]))
     distance = float(np.linalg.norm(plan.landing_support_centre[:2]))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from aerial_model.actuator import ActuatorLaw
@@ -14,10 +16,13 @@ class Drive:
     Args:
         law: limits of the motors.
         steps: physics steps in a control period.
+        battery_resistance: by which the bus voltage sags under load [Ω].
     """
 
-    def __init__(self, law: ActuatorLaw, steps: int) -> None:
+    def __init__(self, law: ActuatorLaw, steps: int, battery_resistance: float = 0.0) -> None:
         self._law = law
+        self._battery_resistance = battery_resistance
+        self._current = 0.0  # drawn from the battery in the last physics step [A]
         shape = (steps, len(law.torque_max))
         self._requested = np.zeros(shape)  # [N·m]
         self._delivered = np.zeros(shape)  # [N·m]
@@ -25,6 +30,7 @@ class Drive:
 
     def clear(self) -> None:
         """Forget the period."""
+        self._current = 0.0
         for record in (self._requested, self._delivered, self._speed):
             record[:] = 0.0
 
@@ -43,11 +49,19 @@ class Drive:
         requested = command.requested_torque(position, speed)
         if step == 0 and not np.isfinite(requested).all():
             raise ValueError(f"a command must ask for finite torques, found {requested}")
-        delivered = self._law.available(requested, speed)
+        law = self._sagging_law() if self._battery_resistance else self._law
+        delivered = law.available(requested, speed)
+        if self._battery_resistance:
+            power = law.voltage(delivered, speed) @ (delivered / (law.torque_constant * law.gear_ratio))
+            self._current = max(float(power), 0.0) / float(self._law.bus_voltage.mean())
         self._requested[step] = requested
         self._delivered[step] = delivered
         self._speed[step] = speed
         return delivered
+
+    def _sagging_law(self) -> ActuatorLaw:
+        voltage = self._law.bus_voltage - self._battery_resistance * self._current
+        return dataclasses.replace(self._law, bus_voltage=np.maximum(voltage, 0.0))
 
     @property
     def requested_torque(self) -> np.ndarray:

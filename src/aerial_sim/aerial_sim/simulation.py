@@ -7,6 +7,9 @@ commands give equal measurements to the last bit.
 
 from __future__ import annotations
 
+import dataclasses
+from collections import deque
+
 import mujoco
 import numpy as np
 
@@ -23,15 +26,17 @@ from aerial_model.robot import (
 )
 from aerial_model.state import Command, Measurement
 from aerial_model.terrain import Terrain
+from aerial_sim.conditions import Conditions
 from aerial_sim.contacts import ContactSensing
 from aerial_sim.drive import Drive
 from aerial_sim.ground_truth import GroundTruth
 from aerial_sim.sensors import SensorNoise, Sensors
-from aerial_sim.world import FRICTION_COEFFICIENT, XYZW, World, build
+from aerial_sim.world import XYZW, World, build
 
 PHYSICS_DT = 0.0005  # [s]
 CONTROL_DT = 0.002  # [s]
 FLAT = Terrain()
+AS_EXPECTED = Conditions()
 START_OFFSET = np.radians(1.0)  # largest error of the joints' starting positions with noise [rad]
 
 
@@ -45,6 +50,7 @@ class Simulation:
         seed: of noise, biases, starting joint offsets and heading.
         physics_dt: MuJoCo's step [s].
         control_dt: period of commands and measurements [s], a multiple of ``physics_dt``.
+        conditions: of battery, drives, robot and ground, from the start on.
 
     Raises:
         ConfigurationError: for an unknown noise, periods that do not fit, or a URDF that MuJoCo cannot use.
@@ -59,6 +65,7 @@ class Simulation:
         seed: int = 0,
         physics_dt: float = PHYSICS_DT,
         control_dt: float = CONTROL_DT,
+        conditions: Conditions = AS_EXPECTED,
     ) -> None:
         steps = round(control_dt / physics_dt)
         if steps < 1 or not np.isclose(steps * physics_dt, control_dt, rtol=1e-9, atol=0.0):
@@ -70,7 +77,10 @@ class Simulation:
         self._noise = SensorNoise.of(robot, noise)
         self._start_offset = 0.0 if noise == "off" else START_OFFSET
         self._start_heading = 0.0 if noise == "off" else np.pi
-        self._drive = Drive(robot.actuators, steps)
+        self._conditions = conditions
+        self._latency_steps = round(conditions.latency / physics_dt)
+        law = dataclasses.replace(robot.actuators, bus_voltage=conditions.battery * robot.actuators.bus_voltage)
+        self._drive = Drive(law, steps, conditions.battery_resistance)
         self._use(build(robot, terrain, physics_dt))
         self.reset(seed)
 
@@ -90,10 +100,15 @@ class Simulation:
         radii = np.array([point.radius for point in self.robot.contact_points])
         q[2] += np.max(self.terrain.height(points) - (points[:, 2] - radii))
         mujoco.mj_resetData(self._world.model, self._data)
-        self.disturb(added_mass=0.0, friction_coefficient=FRICTION_COEFFICIENT)
+        conditions = self._conditions
+        added_mass = (conditions.mass - 1.0) * self.robot.mass
+        self.disturb(added_mass=added_mass, friction_coefficient=conditions.friction, ground_rise=0.0)
         self.set_state(q, np.zeros(self.robot.model.nv))
         self._ticks = 0
         self._push_until = 0.0
+        self._losses = np.random.default_rng([seed, 1])  # apart from the sensors': they stay as they are without losses
+        self._pending: deque[tuple[int, Command]] = deque()  # commands under way, with the physics step they arrive at
+        self._in_force: Command | None = None
         self._drive.clear()
         self._contacts.clear()
         self._contacts.collect(self._data)
@@ -122,14 +137,29 @@ class Simulation:
         velocity_0 = data.qvel[BASE_LINEAR].copy()
         if self.time >= self._push_until:
             data.xfrc_applied[world.trunk] = 0.0
+        self._send(command)
         for k in range(self._steps):
-            data.ctrl[:] = self._drive.torque(k, command, data.qpos[world.joint_qpos], data.qvel[world.joint_dof])
+            in_force = self._arrived(self._ticks * self._steps + k)
+            data.ctrl[:] = self._drive.torque(k, in_force, data.qpos[world.joint_qpos], data.qvel[world.joint_dof])
             mujoco.mj_step(model, data)
             self._contacts.collect(data)
         self._ticks += 1
         mean_acceleration = (data.qvel[BASE_LINEAR] - velocity_0) / self.control_dt
         self._measurement = self._measured(mean_acceleration - model.opt.gravity)
         return self._measurement
+
+    def _send(self, command: Command) -> None:
+        """Put a command on its way to the drives; the first is there at once: they have held the robot until now."""
+        if self._in_force is None:
+            self._in_force = command
+        elif self._conditions.lost_commands == 0 or self._losses.random() >= self._conditions.lost_commands:
+            self._pending.append((self._ticks * self._steps + self._latency_steps, command))
+
+    def _arrived(self, step: int) -> Command:
+        """Return the newest command that has arrived by physics step ``step``."""
+        while self._pending and self._pending[0][0] <= step:
+            self._in_force = self._pending.popleft()[1]
+        return self._in_force
 
     def measure(self) -> Measurement:
         """Return the last measurement again."""
@@ -152,6 +182,7 @@ class Simulation:
         *,
         added_mass: float | None = None,
         friction_coefficient: float | None = None,
+        ground_rise: float | None = None,
     ) -> None:
         """Push the trunk, load it, or change the ground; what is not given stays as it is.
 
@@ -160,6 +191,7 @@ class Simulation:
             duration: how long it acts, from now, in whole control periods [s].
             added_mass: fixed to the trunk's centre of mass from now on, replacing what was added before [kg].
             friction_coefficient: of the ground from now on.
+            ground_rise: of floor and boxes over where the terrain has them, from now on [m].
         """
         if force is not None:
             self._data.xfrc_applied[self._world.trunk, :3] = force
@@ -168,6 +200,8 @@ class Simulation:
             self._added_mass = added_mass
         if friction_coefficient is not None:
             self._friction_coefficient = friction_coefficient
+        if ground_rise is not None:
+            self._ground_rise = ground_rise
         self._apply_disturbances()
 
     def ground_truth(self) -> GroundTruth:
@@ -235,10 +269,12 @@ class Simulation:
         self._data = mujoco.MjData(world.model)
         self._contacts = ContactSensing(world)
         self._trunk_mass = float(world.model.body_mass[world.trunk])
+        self._ground_height = world.model.geom_pos[world.ground_geoms, 2].copy()
 
     def _apply_disturbances(self) -> None:
-        """Give the model the added mass and the ground's friction asked for."""
+        """Give the model the added mass and the ground's friction and height asked for."""
         model = self._world.model
         model.geom_friction[self._world.ground_geoms, 0] = self._friction_coefficient
+        model.geom_pos[self._world.ground_geoms, 2] = self._ground_height + self._ground_rise
         model.body_mass[self._world.trunk] = self._trunk_mass + self._added_mass
         mujoco.mj_setConst(model, mujoco.MjData(model))
