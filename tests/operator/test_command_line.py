@@ -63,6 +63,12 @@ def test_plan_tells_a_person_the_same(aerial):
     assert "peak voltage" in ended.output
 
 
+def test_plan_can_be_verified_by_mujoco(aerial):
+    ended = aerial("plan", "jump", "--to", "0.3,0,0", "--verify", "--json")
+    assert ended.status == 0
+    assert ended.figures["verification"]["passed"]
+
+
 def test_simulate_prints_one_object_with_all_figures(simulated):
     assert simulated.status == 0
     assert simulated.figures.keys() >= SIMULATION_KEYS

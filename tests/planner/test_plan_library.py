@@ -112,7 +112,7 @@ def test_a_disk_that_takes_no_plan_is_told_and_the_plan_is_made(with_library, li
 
 
 def test_a_stored_plan_that_misleads_costs_time_and_not_the_plan(with_library, library, forward):
-    wild = np.random.default_rng(0).normal(scale=300.0, size=forward.plan.force.shape)
+    wild = np.random.default_rng(0).normal(scale=1e5, size=forward.plan.force.shape)
     library.add(dataclasses.replace(forward.plan, force=wild, com=np.zeros_like(forward.plan.com)))
     report = with_library.plan(jump(0.4, 0.0)).report
     assert (report.success, report.started_from) == (True, "srbm")

@@ -19,6 +19,7 @@ from .conftest import jump
 
 G = np.array([0.0, 0.0, -9.81])
 POSITION_TOLERANCE = 1e-4  # [m]
+FOOT_TOLERANCE = 0.01  # of the landing feet's centre: they hang from a body that may be half a degree off level [m]
 MOMENTUM_TOLERANCE = 1e-4  # [kg·m²/s]
 REFUSAL_ITERATIONS = 80  # that a refusal may take; an iteration is some 15 ms
 
@@ -72,14 +73,15 @@ def test_a_plan_is_consistent_and_for_this_robot(case, robot):
     case[1].plan.checked(robot)
 
 
-def test_the_ballistic_path_ends_over_the_goal(case):
+def test_the_ballistic_path_brings_the_feet_to_the_goal(case):
     wanted, result = case
     plan = result.plan
     k = np.searchsorted(plan.time, plan.take_off_time - 1e-9)
     T = plan.landing_time - plan.take_off_time
     landing = plan.com[k] + plan.com_velocity[k] * T + 0.5 * G * T**2
-    lead = 0.05 * plan.com_velocity[k, :2]
-    np.testing.assert_allclose(landing[:2] + lead, wanted.displacement[:2], atol=POSITION_TOLERANCE)
+    np.testing.assert_allclose(landing, plan.com[-1], atol=POSITION_TOLERANCE)
+    feet = plan.foot_position[-1].mean(axis=0)
+    np.testing.assert_allclose(feet[:2], wanted.displacement[:2], atol=FOOT_TOLERANCE)
     assert landing[2] - wanted.displacement[2] == pytest.approx(plan.landing_com_height, abs=POSITION_TOLERANCE)
 
 
@@ -94,8 +96,10 @@ def test_forces_move_the_centre_of_mass_and_its_momentum_as_planned(case, robot)
     for k in range(np.searchsorted(plan.time, plan.take_off_time - 1e-9)):
         dt = plan.time[k + 1] - plan.time[k]
         force = plan.force[k].sum(axis=0)
-        moment = np.cross(plan.foot_position[k] - plan.com[k], plan.force[k]).sum(axis=0)
-        v = plan.com_velocity[k] + (force / robot.mass + G) * dt
+        acceleration = force / robot.mass + G
+        mean_com = plan.com[k] + dt / 2 * plan.com_velocity[k] + dt**2 / 6 * acceleration
+        moment = np.cross(plan.foot_position[k] - mean_com, plan.force[k]).sum(axis=0)
+        v = plan.com_velocity[k] + acceleration * dt
         np.testing.assert_allclose(plan.com_velocity[k + 1], v, atol=POSITION_TOLERANCE)
         np.testing.assert_allclose(
             plan.angular_momentum[k + 1], plan.angular_momentum[k] + moment * dt, atol=MOMENTUM_TOLERANCE

@@ -141,13 +141,16 @@ class KinoDynamic:
             rows.equal("start", s.motion - s.x_0)
         else:
             feet = world_feet(self.model, s)
-            slopes = link_slopes(robot, self.model, s.q_j, s.R)
+            lengths, slopes = link_slopes(robot, self.model, s.q_j, s.R)
             for i in range(n_c):
                 if touching[i]:
                     rows.equal("feet", feet[:, i] - s.foot_ref[:, i])  # (3.9a)
                     rows.between("crouch", slopes[i], settings.link_slope, np.inf)
                 elif not loaded[i]:
                     rows.between("ground", feet[2, i] - s.foot_ref[2, i], 0.0, np.inf)  # (3.10)
+                    # The link above the foot, too: its other end no lower than where it may stand on the foot.
+                    rise = (feet[2, i] - s.foot_ref[2, i]) / lengths[i] + slopes[i]
+                    rows.between("ground", rise, settings.link_slope, np.inf)
         rows.equal("momentum", R.T @ s.alpha - self.model.angular_momentum(s.q_j, s.omega, s.dq_j))  # (3.8)
         pyramid = friction_pyramid(robot.friction_coefficient)[:4]
         for i in np.flatnonzero(loaded):
@@ -155,7 +158,7 @@ class KinoDynamic:
         if self.variant is not Variant.KD:
             self._actuator_rows(rows, s, loaded)
 
-        following = s.step(self.model, robot.mass)
+        following = s.step(robot.mass)
         kind = rows.stage(
             f"take_off_{contact_bits(touching)}_{contact_bits(loaded)}_{self._name}{'_end' if ends_phase else ''}",
             s.x,
@@ -203,8 +206,7 @@ class KinoDynamic:
         for i in np.flatnonzero(touching):
             rows.equal("feet", feet[:, i] - s.foot_ref[:, i])
         landing = s.r + s.flight_time * s.rdot - ca.vertcat(0, 0, 0.5 * GRAVITY * s.flight_time**2)
-        lead = s.landing_lead * ca.vertcat(s.rdot[:2], 0)
-        rows.equal("landing position", landing + lead - s.landing_com)
+        rows.equal("landing position", landing - s.landing_com)
         flight = FlightKnot(s.alpha, s.quaternion, s.q_j, s.flight_time, s.omega, s.flight_p)
         rows.equal("momentum", flight.momentum_gap(self.model))
         # The rates at which the feet leave the ground: without them the last force could be an impulse no leg follows.
@@ -297,13 +299,7 @@ class KinoDynamic:
                     u_max=np.concatenate(u_max),
                 )
             )
-        p = [
-            [schedule.dt],
-            foot_ref,
-            [schedule.flight_time, settings.landing_lead],
-            reference.landing_com,
-            path.parameters(0),
-        ]
+        p = [[schedule.dt], foot_ref, [schedule.flight_time], reference.landing_com, path.parameters(0)]
         T = [guess.flight_time]
         u = [guess.flight_angular_velocity[0], guess.angular_velocity[-1], guess.joint_velocity[-1], T]
         shortest, longest = schedule.flight_time_range

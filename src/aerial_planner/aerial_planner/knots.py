@@ -63,17 +63,10 @@ class TakeOffKnot:
             self.omega_ground = ca.SX.sym("omega_ground", 3)
             self.flight_time, self.flight_time_ref = ca.SX.sym("T"), ca.SX.sym("T_ref")
             self.u = ca.vertcat(self.omega, self.omega_ground, self.dq_j, self.flight_time)
-            self.landing_lead = ca.SX.sym("lead")
             self.landing_com = ca.SX.sym("landing_com", 3)
             self.flight_p = ca.SX.sym("flight_p", FlightKnot.n_p(robot))
-            self.p = ca.vertcat(
-                self.nominal_dt,
-                ca.vec(self.foot_ref),
-                self.flight_time_ref,
-                self.landing_lead,
-                self.landing_com,
-                self.flight_p,
-            )
+            landing = (self.flight_time_ref, self.landing_com, self.flight_p)
+            self.p = ca.vertcat(self.nominal_dt, ca.vec(self.foot_ref), *landing)
             return
         self.u = ca.vertcat(self.omega, self.dq_j, self.f)
         if timed and ends_phase:
@@ -97,14 +90,14 @@ class TakeOffKnot:
     def R(self) -> ca.SX:  # noqa: N802
         return rotation_matrix(self.quaternion)
 
-    def step(self, model: BaseFrameModel, mass: float) -> ca.SX:
-        """Return the next state: (3.5) and (3.6)."""
-        feet = world_feet(model, self)
+    def step(self, mass: float) -> ca.SX:
+        """Return the next state: (3.5) and (3.6); momentum is exact for forces that are constant over the interval."""
         rddot = -ca.vertcat(0, 0, GRAVITY)
         alpha_dot = ca.SX.zeros(3)
+        middle = mean_com(self.r, self.rdot, self.dt)
         for i, f in self.force.items():
             rddot += f / mass
-            alpha_dot += ca.cross(feet[:, i] - self.r, f)
+            alpha_dot += ca.cross(self.foot_ref[:, i] - middle, f)
         rdot_next = self.rdot + rddot * self.dt
         return ca.vertcat(
             self.r + 0.5 * (self.rdot + rdot_next) * self.dt,
@@ -148,18 +141,27 @@ class FlightKnot:
         )
 
 
+def mean_com(r: ca.SX, rdot: ca.SX, dt: ca.SX) -> ca.SX:
+    """Return what to take moments about over an interval with constant forces ``(3,)`` [m].
+
+    That is the mean of r(t) without the part that lies along the total force, which has no moment.
+    """
+    return r + 0.5 * dt * rdot - ca.vertcat(0, 0, GRAVITY * dt**2 / 6)
+
+
 def world_feet(model: BaseFrameModel, s: TakeOffKnot) -> ca.SX:
     """Return c_i ``(3, n_c)`` [m] in S from the centre of mass and the attitude (3.7)."""
     relative = model.feet(s.q_j) - ca.repmat(model.com(s.q_j), 1, s.foot_ref.shape[1])
     return ca.repmat(s.r, 1, s.foot_ref.shape[1]) + s.R @ relative
 
 
-def link_slopes(robot: Robot, model: BaseFrameModel, q_j: ca.SX, R: ca.SX) -> ca.SX:
-    """Return the sine ``(n_c,)`` of the slope of the link that carries each contact point."""
+def link_slopes(robot: Robot, model: BaseFrameModel, q_j: ca.SX, R: ca.SX) -> tuple[np.ndarray, ca.SX]:
+    """Return the length ``(n_c,)`` [m] of the link that carries each contact point, and the sine ``(n_c,)`` of its slope."""
     q_0 = robot.poses["home"]
     lengths = np.linalg.norm(np.asarray(model.last_joints(q_0)) - np.asarray(model.feet(q_0)), axis=0)
     rise = (R @ (model.last_joints(q_j) - model.feet(q_j)))[2, :]
-    return rise.T / np.maximum(lengths, _POINT)
+    lengths = np.maximum(lengths, _POINT)
+    return lengths, rise.T / lengths
 
 
 def foot_velocities(model: BaseFrameModel, s: TakeOffKnot) -> list[ca.SX]:

@@ -186,12 +186,15 @@ class Planner:
         stage = self._stage(request)
         motion = load_motion(request.motion)
         q_start = self._start_configuration(start)
-        least_rise = 0.0
+        least_rise, take_off = 0.0, None
         while True:
             schedule = self._schedule(request, motion, least_rise)
             reference = body_reference(schedule, q_start, self.robot, self._model, self._ik, self.settings)
             screen(request, schedule, reference, self.robot)
-            take_off, solution = self._take_off(request, stage, schedule, reference, progress, clock)
+            if take_off is None:
+                take_off, solution = self._take_off(request, stage, schedule, reference, progress, clock)
+            else:  # the lower flight is near
+                take_off, solution = self._optimize(stage, schedule, reference, take_off, progress, clock)
             plan = assemble(request, self.robot, self._model, schedule, reference, take_off)
             use = actuator_use(plan, self.robot)
             check(plan, schedule, solution, use, self.robot, self.actuator_tolerance)

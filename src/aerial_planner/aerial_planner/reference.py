@@ -65,7 +65,7 @@ class Reference:
     joint_position: np.ndarray  # (N+1, n) [rad]
     foot_position: np.ndarray  # (n_c, 3) of the standing robot [m]
     x_0: np.ndarray  # (13 + n,) initial state r, ṙ, α, quaternion, q_j
-    landing_com: np.ndarray  # (3,) of the centre of mass at touchdown, led by its velocity [m]
+    landing_com: np.ndarray  # (3,) of the centre of mass at touchdown [m]
     landing_com_height: float  # above the landing surface, to hold after landing [m]
     landing_joint_position: np.ndarray  # (n,) [rad]
     flight_path: FlightPath
@@ -115,7 +115,7 @@ def body_reference(
         joint_position=np.tile(q_j, (N + 1, 1)),
         foot_position=feet,
         x_0=np.concatenate([com_0, np.zeros(6), quaternion, q_j]),
-        landing_com=landing_com,
+        landing_com=landing_com - lead,
         landing_com_height=height,
         landing_joint_position=landing_pose,
         flight_path=_flight_path(schedule, robot, stretched, landing_pose),

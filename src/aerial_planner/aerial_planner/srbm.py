@@ -17,6 +17,7 @@ from aerial_model.contact import friction_pyramid
 from aerial_model.robot import Robot
 from aerial_planner.compiled import FunctionLibrary
 from aerial_planner.inverse_kinematics import InverseKinematics
+from aerial_planner.knots import mean_com
 from aerial_planner.reference import Reference
 from aerial_planner.schedule import GRAVITY, Schedule, contact_bits
 from aerial_planner.settings import PlannerSettings
@@ -123,7 +124,7 @@ class SingleRigidBody:
         rddot, alpha_dot = -ca.vertcat(0, 0, GRAVITY), ca.SX.zeros(3)
         for i, f in force.items():
             rddot += f / robot.mass
-            alpha_dot += ca.cross(s.foot_ref[:, i] - s.r, f)
+            alpha_dot += ca.cross(s.foot_ref[:, i] - mean_com(s.r, s.rdot, dt), f)
         rdot_next = s.rdot + rddot * dt
         following = ca.vertcat(
             s.r + 0.5 * (s.rdot + rdot_next) * dt,
@@ -157,12 +158,12 @@ class SingleRigidBody:
         key = ("lift_off", held)
         if key not in self._kinds:
             s = _BodySymbols(self.robot.n_contacts)
-            share, T, T_ref, lead = (ca.SX.sym(name) for name in ("share", "T", "T_ref", "lead"))
+            share, T, T_ref = (ca.SX.sym(name) for name in ("share", "T", "T_ref"))
             landing_com = ca.SX.sym("goal", 3)
             rows = Rows()
             self._reach_rows(rows, s, held)
-            rows.equal("landing position", s.landing_gap(T, lead, landing_com))
-            p = ca.vertcat(share, T_ref, lead, landing_com, ca.vec(s.foot_ref))
+            rows.equal("landing position", s.landing_gap(T, landing_com))
+            p = ca.vertcat(share, T_ref, landing_com, ca.vec(s.foot_ref))
             following = _flight_step(s.alpha, s.quaternion, T, share, self.inertia_inverse)
             cost = self.settings.weights.flight_time * (T - T_ref) ** 2
             self._kinds[key] = rows.stage(f"body_lift_off_{contact_bits(held)}", s.x, T, p, cost, following)
@@ -208,7 +209,7 @@ class SingleRigidBody:
             )
         share, T = np.array([1 / schedule.flight_knots]), np.array([schedule.flight_time])
         shortest, longest = (np.array([bound]) for bound in schedule.flight_time_range)
-        p = [share, T, [settings.landing_lead], reference.landing_com, foot_ref]
+        p = [share, T, reference.landing_com, foot_ref]
         stages.append(StageData.free(p=np.concatenate(p), x=x[-1], u=T, u_min=shortest, u_max=longest))
         for k in range(1, schedule.flight_knots + 1):
             last = k == schedule.flight_knots
@@ -263,10 +264,9 @@ class _BodySymbols:
         """Return the body rate ``(3,)`` in B [rad/s]."""
         return ca.DM(inertia_inverse) @ (self.R.T @ self.alpha)
 
-    def landing_gap(self, T: ca.SX, lead: ca.SX, landing_com: ca.SX) -> ca.SX:
-        """Return where the ballistic path ends, led by its horizontal velocity, relative to the goal ``(3,)`` [m]."""
-        landing = self.r + T * self.rdot - ca.vertcat(0, 0, 0.5 * GRAVITY * T**2)
-        return landing + lead * ca.vertcat(self.rdot[:2], 0) - landing_com
+    def landing_gap(self, T: ca.SX, landing_com: ca.SX) -> ca.SX:
+        """Return where the ballistic path ends, relative to the goal ``(3,)`` [m]."""
+        return self.r + T * self.rdot - ca.vertcat(0, 0, 0.5 * GRAVITY * T**2) - landing_com
 
 
 def _flight_step(alpha: ca.SX, quaternion: ca.SX, T: ca.SX, share: ca.SX, inertia_inverse: np.ndarray) -> ca.SX:

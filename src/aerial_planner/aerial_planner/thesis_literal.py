@@ -17,7 +17,7 @@ import numpy as np
 from aerial_model import rotation
 from aerial_model.robot import Robot
 from aerial_planner.kino_dynamic import Variant
-from aerial_planner.knots import joint_inertia, link_slopes
+from aerial_planner.knots import joint_inertia, link_slopes, mean_com
 from aerial_planner.reference import Reference
 from aerial_planner.schedule import GRAVITY, Schedule
 from aerial_planner.settings import PlannerSettings
@@ -111,7 +111,8 @@ class LiteralProblem:
         dt, mass, subject_to = self.schedule.dt, self.robot.mass, self.opti.subject_to
         for k in range(self.N):
             forces = ca.reshape(self.f[:, k], 3, -1)
-            levers = ca.reshape(self.c[:, k], 3, -1) - ca.repmat(self.r[:, k], 1, self.robot.n_contacts)
+            centre = mean_com(self.r[:, k], self.rdot[:, k], dt)
+            levers = ca.reshape(self.c[:, k], 3, -1) - ca.repmat(centre, 1, self.robot.n_contacts)
             moment = sum(ca.cross(levers[:, i], forces[:, i]) for i in range(self.robot.n_contacts))
             subject_to(mass * self.rddot[:, k] == ca.sum2(forces) - ca.DM([0, 0, mass * GRAVITY]))  # (3.5)
             subject_to(self.alpha_dot[:, k] == moment)
@@ -138,7 +139,7 @@ class LiteralProblem:
         mu, subject_to = self.robot.friction_coefficient, self.opti.subject_to
         feet = self.reference.foot_position
         for k in range(self.N + 1):
-            slopes = link_slopes(self.robot, self.model, self.q_j[:, k], self.R[k])
+            lengths, slopes = link_slopes(self.robot, self.model, self.q_j[:, k], self.R[k])
             for i in range(self.robot.n_contacts):
                 rows = slice(3 * i, 3 * i + 3)
                 held = k > 0 and self.schedule.contact[k - 1, i]
@@ -148,7 +149,9 @@ class LiteralProblem:
                     if k < self.N:
                         subject_to(slopes[i] >= self.settings.link_slope)
                 elif not loaded and 0 < k < self.N:
-                    subject_to(self.c[3 * i + 2, k] >= feet[i, 2])  # (3.10)
+                    rise = self.c[3 * i + 2, k] - feet[i, 2]
+                    subject_to(rise >= 0)  # (3.10)
+                    subject_to(rise / lengths[i] + slopes[i] >= self.settings.link_slope)
                 force = self.f[rows, k]
                 if loaded:
                     subject_to(self.opti.bounded(-mu * force[2], force[0], mu * force[2]))  # (3.9b)
@@ -201,8 +204,7 @@ class LiteralProblem:
         self.opti.subject_to(start == x_0)  # 𝒳_0
         r, rdot = self.r[:, self.N], self.rdot[:, self.N]
         landing = r + rdot * T - ca.vertcat(0, 0, 0.5 * GRAVITY * T**2)
-        lead = self.settings.landing_lead * ca.vertcat(rdot[:2], 0)
-        self.opti.subject_to(landing + lead == self.reference.landing_com)  # 𝒳_N
+        self.opti.subject_to(landing == self.reference.landing_com)  # 𝒳_N
 
     def _flight(self) -> None:
         path, subject_to = self.reference.flight_path, self.opti.subject_to
@@ -268,6 +270,9 @@ class LiteralProblem:
         force = np.concatenate([guess.force, np.zeros((1, n_c, 3))])
         rddot = force.sum(axis=1) / self.robot.mass - [0.0, 0.0, GRAVITY]
         rddot[-1] = 0.0
+        centre = np.array(
+            [mean_com(r, rdot, self.schedule.dt) for r, rdot in zip(guess.com, guess.com_velocity, strict=True)]
+        )[..., 0]
         velocity = np.diff(base, axis=0) / self.schedule.dt
         values = {
             self.base: base,
@@ -280,7 +285,7 @@ class LiteralProblem:
             self.rdot: guess.com_velocity,
             self.rddot: rddot,
             self.alpha: guess.angular_momentum,
-            self.alpha_dot: np.cross(positions - guess.com[:, None], force).sum(axis=1),
+            self.alpha_dot: np.cross(positions - centre[:, None], force).sum(axis=1),
             self.c: positions.reshape(N + 1, -1),
             self.f: force.reshape(N + 1, -1),
             self.flight_quaternion: guess.flight_orientation,

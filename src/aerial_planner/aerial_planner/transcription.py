@@ -46,7 +46,9 @@ class SolverOptions:
     solver: str = "fatrop"  # or "ipopt" (with MUMPS)
     tolerance: float = 1e-4  # on optimality and constraints
     max_iterations: int = 100
-    initial_barrier: float = 1e-2  # μ_0 of the interior-point method
+    initial_barrier: float = 1.0  # μ_0 of the interior-point method: high, where the guess is outside of the limits
+    barrier_accuracy: float = 100.0  # how far a barrier problem is solved before the next, in multiples of μ
+    bound_distance: float = 0.3  # of the guess from its bounds, as a share of their range (or of 1, if smaller)
 
 
 class Problem:
@@ -107,6 +109,15 @@ class Problem:
         nlp = {"x": w, "p": p, "f": functions["nlp_f"](w, p), "g": functions["nlp_g"](w, p)}
         common = {"print_time": False, "cache": functions, "error_on_fail": False, "calc_lam_p": False}
         options = self.options
+        interior_point = {
+            "print_level": 0,
+            "tol": options.tolerance,
+            "max_iter": options.max_iterations,
+            "mu_init": options.initial_barrier,
+            "barrier_tol_factor": options.barrier_accuracy,
+            "bound_push": options.bound_distance,
+            "bound_frac": options.bound_distance,
+        }
         if options.solver == "fatrop":
             settings = {
                 "structure_detection": "manual",
@@ -115,24 +126,10 @@ class Problem:
                 "nu": layout.nu,
                 "ng": layout.ng,
                 "equality": layout.equality.tolist(),
-                "fatrop": {
-                    "print_level": 0,
-                    "tol": options.tolerance,
-                    "max_iter": options.max_iterations,
-                    "mu_init": options.initial_barrier,
-                },
+                "fatrop": interior_point,
             }
         else:
-            settings = {
-                "ipopt": {
-                    "print_level": 0,
-                    "sb": "yes",
-                    "tol": options.tolerance,
-                    "max_iter": options.max_iterations,
-                    "mu_init": options.initial_barrier,
-                    "linear_solver": "mumps",
-                }
-            }
+            settings = {"ipopt": {**interior_point, "sb": "yes", "linear_solver": "mumps"}}
         return ca.nlpsol("kino_dynamic", options.solver, nlp, {**common, **settings})
 
 

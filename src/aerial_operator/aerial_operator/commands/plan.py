@@ -5,6 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+import numpy as np
+
+from aerial_evaluation.verification import Verification, verify
 from aerial_model.errors import RefusalError
 from aerial_model.plan_file import save_plan
 from aerial_model.robot import Robot
@@ -20,6 +23,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add goal, planner options and where to save the plan."""
     add_goal_arguments(parser)
     add_planner_arguments(parser)
+    parser.add_argument(
+        "--verify", action="store_true", help="let MuJoCo fly the plan; it fails 3° or 3 cm off the goal"
+    )
     parser.add_argument("--out", metavar="FILE", type=Path, help="save the plan (.npz, see aerial_model.plan_file)")
 
 
@@ -35,7 +41,12 @@ def run(args: argparse.Namespace) -> Report:
         return Report(success=False, figures=refusal.report.to_json(), text=_times(refusal.report))
     if args.out is not None:
         save_plan(result.plan, args.out)
-    return Report(success=True, figures=result.report.to_json(), text=summary(result.report))
+    figures, text = result.report.to_json(), summary(result.report)
+    if not args.verify:
+        return Report(success=True, figures=figures, text=text)
+    verification = verify(robot, result.plan)
+    figures["verification"] = verification.to_json()
+    return Report(success=verification.passed, figures=figures, text=f"{text}\n{_verdict(verification)}")
 
 
 def summary(report: PlanReport) -> str:
@@ -57,6 +68,14 @@ def summary(report: PlanReport) -> str:
                 ]
             ),
         ]
+    )
+
+
+def _verdict(verification: Verification) -> str:
+    verdict = "the plan holds" if verification.passed else "THE PLAN FAILS"
+    return (
+        f"flown by MuJoCo: {np.rad2deg(verification.attitude_error):.1f}° and "
+        f"{100 * verification.position_error:.1f} cm off the goal; {verdict}"
     )
 
 
