@@ -22,6 +22,7 @@ COMMANDS = {
     "demo": "jump forward, backward, to the left and onto a platform: three nodes in real time, then a table",
     "plan": "plan one motion and print its figures",
     "simulate": "plan one motion, then run it in closed loop in one process, and judge the landing",
+    "campaign": "many seeded trials of one motion in parallel: the share that lands, and which seeds do not",
     "compile": "compile the planner's functions once, so that plans take half the time",
     "bench": "measure how fast and how reliably motions are planned, next to the thesis and to peers",
     "up": "start planner, controller and simulator, and keep them running",

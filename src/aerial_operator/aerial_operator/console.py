@@ -32,6 +32,32 @@ def say(sentence: str) -> None:
     print(f"aerial: {sentence}", file=sys.stderr, flush=True)
 
 
+class ProgressBar:
+    """How far a long command is: one line that changes, or, where lines cannot change, one at every tenth.
+
+    Args:
+        total: number of steps.
+    """
+
+    _WIDTH = 30
+
+    def __init__(self, total: int) -> None:
+        self._total = total
+        self._said = 0
+
+    def show(self, done: int, remark: str = "") -> None:
+        """Say that ``done`` steps are done."""
+        tenth = 10 * done // self._total
+        if sys.stderr.isatty():
+            filled = self._WIDTH * done // self._total
+            end = "\n" if done == self._total else ""
+            bar = "█" * filled + "·" * (self._WIDTH - filled)
+            print(f"\raerial: {bar} {done} of {self._total}, {remark} ", end=end, file=sys.stderr, flush=True)
+        elif tenth > self._said:
+            self._said = tenth
+            say(f"{done} of {self._total}, {remark}")
+
+
 @contextmanager
 def reserved_output() -> Iterator[TextIO]:
     """Yield standard output; meanwhile whatever else writes there, libraries included, writes to standard error."""

@@ -14,6 +14,7 @@ from aerial_operator.goal import add_goal_arguments, request_from
 from aerial_operator.pictures import save_picture
 from aerial_operator.planning import add_planner_arguments, planner_choices, warm_planner
 from aerial_operator.settings import add_setting_argument, with_settings
+from aerial_operator.world import add_world_argument, conditions_from
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -22,6 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_planner_arguments(parser)
     parser.add_argument("--noise", choices=("nominal", "off"), default="nominal", help="(default: nominal)")
     parser.add_argument("--picture", metavar="FILE", type=Path, help="draw the motion into a PNG file")
+    add_world_argument(parser)
     add_setting_argument(parser)
 
 
@@ -31,7 +33,9 @@ def run(args: argparse.Namespace) -> Report:
     request = request_from(args, robot, **planner_choices(args))
     planner = warm_planner(args, robot, request)
     try:
-        outcome = run_closed_loop(robot, request, seed=args.seed, noise=args.noise, planner=planner)
+        outcome = run_closed_loop(
+            robot, request, seed=args.seed, noise=args.noise, conditions=conditions_from(args), planner=planner
+        )
     except RefusalError as refusal:
         say(f"refused: {refusal.reason}")
         return Report(success=False, figures=_refused(refusal, args.seed), text=f"{args.motion}: refused")

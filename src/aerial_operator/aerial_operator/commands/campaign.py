@@ -1,0 +1,130 @@
+"""``aerial campaign``: many seeded trials of one motion in parallel, and what share of them lands."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shlex
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from aerial_evaluation.campaign import Campaign, results, summary, trials, workers
+from aerial_evaluation.campaign_figure import draw
+from aerial_model.robot import Robot
+from aerial_operator.console import ProgressBar, Report, UsageError, pairs, say, table, to_json
+from aerial_operator.goal import add_goal_arguments, request_from
+from aerial_operator.planning import add_planner_arguments, planner_choices
+from aerial_operator.settings import add_setting_argument, with_settings
+from aerial_operator.world import add_vary_argument, add_world_argument, conditions_from
+
+FAILURES_SHOWN = 10
+_PASSED_ON = {  # what a trial alone must be told, and what it takes to be so
+    "robot": "mini_cheetah",
+    "yaw": 0.0,
+    "rotation": None,
+    "platform": None,
+    "hurdle": None,
+    "edge": None,
+    "variant": "AAKD*",
+    "solver": "fatrop",
+    "noise": "nominal",
+}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add goal, planner, world, and how many trials run where."""
+    add_goal_arguments(parser)
+    add_planner_arguments(parser)
+    parser.add_argument("--trials", metavar="N", type=int, default=20, help="with seeds from --seed on (default: 20)")
+    parser.add_argument("--noise", choices=("nominal", "off"), default="nominal", help="(default: nominal)")
+    add_world_argument(parser)
+    add_vary_argument(parser)
+    add_setting_argument(parser)
+    parser.add_argument(
+        "--workers", metavar="N", type=int, default=os.cpu_count(), help="processes (default: one per processor)"
+    )
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster to run on instead")
+    parser.add_argument(
+        "--out", metavar="FOLDER", type=Path, help="for results and figure (default: out/campaign/MOTION)"
+    )
+
+
+def run(args: argparse.Namespace) -> Report:
+    """Run all trials; what is done is in the results file at any time."""
+    if args.workers < 1:
+        raise UsageError(f"--workers: expected at least 1, found {args.workers}")
+    if args.library is not None:
+        raise UsageError("--library: trials that learn from one another would not be repeatable alone")
+    robot = with_settings(Robot.load(args.robot), args.settings)
+    request = request_from(args, robot, **planner_choices(args))
+    campaign = Campaign(robot=robot, request=request, noise=args.noise, solver=args.solver)
+    todo = trials(args.trials, args.seed, args.vary, conditions_from(args))
+    folder = args.out or Path("out/campaign") / args.motion
+    folder.mkdir(parents=True, exist_ok=True)
+    done: list[dict[str, Any]] = []
+    bar = ProgressBar(len(todo))
+    with (folder / "trials.jsonl").open("w") as file, workers(args.workers, args.scheduler) as client:
+        for result in results(campaign, todo, client):
+            done.append(result)
+            print(json.dumps(result), file=file, flush=True)
+            bar.show(len(done), f"{sum(r['landed'] for r in done)} landed")
+    figures = {
+        "motion": args.motion,
+        "robot": robot.name,
+        "noise": args.noise,
+        "seed": args.seed,
+        **summary(done, args.vary),
+        "figure": str(folder / "campaign.png"),
+        "results": str(folder / "trials.jsonl"),
+    }
+    for failure in figures["failures"]:
+        failure["command"] = _command(args, failure)
+    title = f"{args.motion} of {robot.name}: {figures['landed']} of {figures['trials']} landed"
+    draw(title, done, figures["conditions"], folder / "campaign.png")
+    (folder / "campaign.json").write_text(to_json(figures) + "\n")
+    say(f"results are in {folder}")
+    return Report(success=True, figures=figures, text=_text(figures))
+
+
+def _command(args: argparse.Namespace, failure: Mapping[str, Any]) -> str:
+    """Return the command line that runs a failed trial alone and draws it."""
+    words = ["./aerial", "simulate", args.motion, "--to", ",".join(f"{number:g}" for number in args.to)]
+    for name, usual in _PASSED_ON.items():
+        value = getattr(args, name)
+        if value != usual:
+            words += [f"--{name.replace('_', '-')}", f"{value:g}" if isinstance(value, float) else str(value)]
+    words += [f"--{name.replace('_', '-')}" for name in ("no_warm_start", "optimize_timing") if getattr(args, name)]
+    for path, value in args.settings:
+        words += ["--set", f"{'.'.join(path)}={value}"]
+    for name, value in failure["conditions"].items():
+        words += ["--world", f"{name}={value!r}"]
+    return shlex.join([*words, "--seed", str(failure["seed"]), "--picture", "trial.png"])
+
+
+def _text(figures: Mapping[str, Any]) -> str:
+    low, high = figures["interval95"]
+    parts = [
+        f"{figures['motion']} of {figures['robot']}: {figures['landed']} of {figures['trials']} landed "
+        f"(with 95 % confidence {100 * low:.1f} to {100 * high:.1f} %)"
+    ]
+    if figures["conditions"]:
+        name = next(iter(figures["conditions"][0]))
+        rows = [[f"{row[name]:g}", f"{row['landed']} of {row['trials']}"] for row in figures["conditions"]]
+        parts.append(table([name, "landed"], rows))
+    if figures["figures"]:
+        rows = [
+            [name, *(f"{spread[key]:.3g}" for key in ("p50", "p95", "max"))]
+            for name, spread in figures["figures"].items()
+        ]
+        parts.append(table(["of those that landed", "median", "95 %", "largest"], rows))
+    if figures["failures"]:
+        shown = figures["failures"][:FAILURES_SHOWN]
+        rest = len(figures["failures"]) - len(shown)
+        parts.append(
+            "not landed, and how to see it:\n"
+            + pairs([(failure["reason"], failure["command"]) for failure in shown])
+            + (f"\n  … and {rest} more" if rest else "")
+        )
+    return "\n\n".join(parts)
