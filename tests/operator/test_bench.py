@@ -62,3 +62,11 @@ def test_a_peer_that_is_asked_for_but_absent_is_one_sentence(aerial, monkeypatch
     assert ended.status == 1
     assert "--with-crocoddyl" in ended.errors
     assert ended.errors.count("\n") == 1
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_anything_is_measured(aerial, tmp_path):
+    (tmp_path / "file").write_text("")
+    ended = aerial("bench", "planner", "--sections", "variants", "--out", tmp_path / "file" / "folder")
+    assert ended.status == 1
+    assert "cannot be written" in ended.errors
+    assert ended.errors.count("\n") == 1

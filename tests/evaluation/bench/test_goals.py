@@ -1,12 +1,13 @@
 """Which goals a benchmark draws, and how it finds the reach."""
 
+import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from aerial_evaluation.bench.goals import SHARE, Family, draw, families, find_reach
-from aerial_evaluation.bench.subject import motions_in_order, usual_request
+from aerial_evaluation.bench.subject import motions_of, usual_request
 from aerial_model.errors import RefusalError
 from aerial_model.request import MotionRequest
 from aerial_model.robot import Robot
@@ -83,10 +84,15 @@ def test_platforms_are_as_high_as_the_goal(robot):
         assert request.terrain.height(request.displacement[:2]) == pytest.approx(height)
 
 
-def test_motions_come_from_their_files_those_that_turn_least_first():
-    motions = motions_in_order()
+def test_motions_come_from_their_files_those_that_turn_least_first(robot):
+    motions = motions_of(robot)
     assert {"jump", "spin", "barrel_roll", "front_flip", "back_flip"} <= set(motions)
     assert motions.index("jump") < motions.index("spin") < motions.index("barrel_roll")
+
+
+def test_motions_of_contacts_that_a_robot_does_not_have_are_none_of_its(robot):
+    points = tuple(dataclasses.replace(point, name=f"{point.name}_toe") for point in robot.contact_points)
+    assert motions_of(dataclasses.replace(robot, contact_points=points)) == ("jump", "spin")
 
 
 def test_a_motion_that_would_stay_goes_forward():

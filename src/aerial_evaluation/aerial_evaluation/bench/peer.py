@@ -114,7 +114,7 @@ def crocoddyl(subject: Subject) -> list[Row]:
         if load_motion(motion).rotation is not None:
             continue
         for settings in _settings(subject, motion):
-            rows.append(_row(subject, motion, settings, environment))
+            rows += _rows(subject, motion, settings, environment)
     return rows
 
 
@@ -125,11 +125,16 @@ def _settings(subject: Subject, motion: str) -> list[PlannerSettings]:
     return [dataclasses.replace(usual, dt=schedule.take_off_time / n) for n in KNOTS]
 
 
-def _row(subject: Subject, motion: str, settings: PlannerSettings, environment: Environment) -> Row:
+def _rows(subject: Subject, motion: str, settings: PlannerSettings, environment: Environment) -> list[Row]:
+    """Return the row of a motion and step, none if there is no plan that says where and when the peer is to land."""
     request = usual_request(motion)
     planner = Planner(subject.robot, settings=settings, cache=subject.cache, actuator_tolerance=np.inf)
     planner.warm_up(request)
-    plan = planner.plan(request).plan
+    result = measure(planner, request).result
+    if result is None:
+        subject.progress(f"crocoddyl: no plan of {motion} in steps of {settings.dt:.4f} s to compare with")
+        return []
+    plan = result.plan
     knots = int(np.sum(_in_take_off(plan)))
     subject.progress(f"crocoddyl: {motion} with {knots} knots")
     peer = environment.solve(problem(plan, subject.robot, settings, subject.repeats))
@@ -148,7 +153,7 @@ def _row(subject: Subject, motion: str, settings: PlannerSettings, environment: 
     }
     total = ours["cpu_time_s"]
     row["speed_ratio"] = None if total is None else row["cpu_time_s"]["p50"] / total["p50"]
-    return row
+    return [row]
 
 
 def problem(plan: Plan, robot: Robot, settings: PlannerSettings, repeats: int) -> dict[str, Any]:

@@ -14,7 +14,8 @@ from aerial_model.request import MotionRequest
 from aerial_model.robot import Robot
 from aerial_planner.kino_dynamic import Variant
 from aerial_planner.planner import Planner
-from aerial_planner.schedule import known_motions, load_motion
+from aerial_planner.schedule import contact_schedule, known_motions, load_motion
+from aerial_planner.settings import PlannerSettings
 
 FORWARD = 0.4  # where a motion goes that neither turns nor travels unless told to [m]
 
@@ -45,10 +46,19 @@ class Subject:
         return Planner(self.robot, cache=self.cache, actuator_tolerance=np.inf)
 
 
-def motions_in_order() -> tuple[str, ...]:
-    """Return the known motions, those that turn least first."""
-    turns = {name: load_motion(name).rotation for name in known_motions()}
+def motions_of(robot: Robot) -> tuple[str, ...]:
+    """Return the known motions that name no contact the robot does not have, those that turn least first."""
+    turns = {name: load_motion(name).rotation for name in known_motions() if _suits(name, robot)}
     return tuple(sorted(turns, key=lambda name: (0.0 if turns[name] is None else turns[name].turns, name)))
+
+
+def _suits(motion: str, robot: Robot) -> bool:
+    settings = robot.section("planner", PlannerSettings)
+    try:
+        contact_schedule(usual_request(motion), load_motion(motion), robot, settings.dt, settings.flight_knots)
+    except ConfigurationError:
+        return False
+    return True
 
 
 def usual_request(motion: str, variant: Variant = Variant.AAKD_STAR, *, warm_start: bool = True) -> MotionRequest:

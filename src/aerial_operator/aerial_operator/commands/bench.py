@@ -8,7 +8,7 @@ from pathlib import Path
 from aerial_evaluation.bench.machine import machine
 from aerial_evaluation.bench.peer import Environment
 from aerial_evaluation.bench.planner import SECTIONS, measured
-from aerial_evaluation.bench.subject import Subject, motions_in_order
+from aerial_evaluation.bench.subject import Subject, motions_of
 from aerial_model.config import closest
 from aerial_model.errors import ConfigurationError
 from aerial_model.robot import Robot
@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=_names,
         help=f"of the benchmark (default: all, crocoddyl where it is installed): {', '.join(SECTIONS)}",
     )
-    parser.add_argument("--motions", metavar="NAME[,…]", type=_names, help="(default: all)")
+    parser.add_argument("--motions", metavar="NAME[,…]", type=_names, help="(default: all it has the contacts for)")
     parser.add_argument("--repeats", metavar="N", type=int, default=REPEATS, help=f"(default: {REPEATS})")
     parser.add_argument("--goals", metavar="N", type=int, default=GOALS, help=f"of each motion (default: {GOALS})")
     parser.add_argument("--compiled", action="store_true", help="use what `aerial compile` made, where it made it")
@@ -42,9 +42,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> Report:
     """Measure section by section; the file holds what is measured so far, if a long run is interrupted."""
     sections = _sections(args)
+    robot = Robot.load(args.robot)
     subject = Subject(
-        robot=Robot.load(args.robot),
-        motions=args.motions or motions_in_order(),
+        robot=robot,
+        motions=args.motions or motions_of(robot),
         repeats=args.repeats,
         goals=args.goals,
         seed=args.seed,
@@ -61,6 +62,7 @@ def run(args: argparse.Namespace) -> Report:
         "rows": [],
     }
     file = args.out / f"{args.what}.json"
+    _write(file, to_json(figures))  # before an hour is spent on what cannot be written
     for row in measured(subject, sections):
         figures["rows"].append(row)
         _write(file, to_json(figures))
