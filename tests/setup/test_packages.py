@@ -10,7 +10,12 @@ import pytest
 SOURCES = Path(__file__).resolve().parents[2] / "src"
 PACKAGES = sorted(setup.parent.name for setup in SOURCES.glob("*/setup.py"))
 ROSDEP_KEYS = {"PIL": "python3-pil", "matplotlib": "python3-matplotlib", "numpy": "python3-numpy"}
-ROSDEP_KEYS |= {"numba": "python3-numba", "scipy": "python3-scipy", "yaml": "python3-yaml"}
+ROSDEP_KEYS |= {
+    "distributed": "python3-distributed",
+    "numba": "python3-numba",
+    "scipy": "python3-scipy",
+    "yaml": "python3-yaml",
+}
 WITHOUT_ROSDEP_KEY = {"casadi", "coal", "mujoco", "osqp", "pinocchio", "rosbags"}  # README: from requirements.txt
 IN_ITS_OWN_ENVIRONMENT = {"crocoddyl"}  # a peer, in an environment that `aerial bench planner --with-crocoddyl` makes
 
