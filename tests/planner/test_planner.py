@@ -70,7 +70,9 @@ def case(request, planner):
 
 
 def test_a_plan_is_consistent_and_for_this_robot(case, robot):
-    case[1].plan.checked(robot)
+    plan = case[1].plan
+    assert plan.checked(robot) is plan
+    assert (plan.robot, plan.model_hash) == (robot.name, robot.model_hash)
 
 
 def test_the_ballistic_path_brings_the_feet_to_the_goal(case):

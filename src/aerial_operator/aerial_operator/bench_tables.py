@@ -149,4 +149,39 @@ _TABLES = {
             "reach [m, turns]": _reach,
         },
     ),
+    "library": _Table(
+        "Starts of AAKD*: the bare reference, a single rigid body, the nearest of a few stored plans",
+        {
+            "goals": lambda row: row["family"],
+            "start": lambda row: row["start"],
+            "stored": lambda row: str(row["stored"]) if row["start"] == "library" else "",
+            "near": lambda row: _count("found")(row) if row["start"] == "library" else "",
+            **_COUNTS,
+            **_TIMES,
+            "iterations": _iterations,
+        },
+    ),
+    "timing": _Table(
+        "Phase durations fixed or optimized: AAKD*+WS; cost, take-off time and peaks are medians of goals both solve",
+        {
+            "goals": lambda row: row["family"],
+            "durations": lambda row: "optimized" if row["optimize_timing"] else "fixed",
+            **_COUNTS,
+            **_TIMES,
+            "iterations": _iterations,
+            "cost": lambda row: "–" if row["cost"] is None else f"{row['cost']['p50']:.2f}",
+            "take-off": _seconds("take_off_time_s"),
+            "torque": lambda row: percent(None if row["torque_ratio"] is None else row["torque_ratio"]["p50"]),
+            "voltage": lambda row: percent(None if row["voltage_ratio"] is None else row["voltage_ratio"]["p50"]),
+            "reach [m, turns]": _reach,
+        },
+    ),
+    "memory": _Table(
+        "Memory of a planner that serves varied requests, those it refuses included",
+        {
+            "requests": lambda row: str(row["requests"]),
+            "planned": lambda row: str(row["planned"]),
+            "memory": lambda row: f"{row['memory_mb']:.0f} MB",
+        },
+    ),
 }

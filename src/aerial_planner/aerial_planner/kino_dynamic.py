@@ -30,6 +30,7 @@ import numpy as np
 from aerial_model.contact import friction_pyramid
 from aerial_model.robot import Robot
 from aerial_planner.compiled import FunctionLibrary
+from aerial_planner.formulation import Formulation
 from aerial_planner.knots import FlightKnot, TakeOffKnot, foot_velocities, joint_inertia, link_slopes, world_feet
 from aerial_planner.reference import Reference
 from aerial_planner.schedule import GRAVITY, Schedule, contact_bits
@@ -40,7 +41,7 @@ from aerial_planner.symbolic import (
     attitude_error,
 )
 from aerial_planner.trajectory import TakeOffTrajectory
-from aerial_planner.transcription import Problem, Solution, SolverOptions
+from aerial_planner.transcription import Solution, SolverOptions
 
 
 class Variant(StrEnum):
@@ -51,8 +52,8 @@ class Variant(StrEnum):
     AAKD_STAR = "AAKD*"  # (3.11) with the Jacobian at frozen ab/adduction
 
 
-class KinoDynamic:
-    """Builds and solves kino-dynamic problems of one robot and variant; a problem is built once per contact schedule."""
+class KinoDynamic(Formulation):
+    """Builds and solves the kino-dynamic problems of one robot and variant; ``timed``: phase durations are optimized."""
 
     def __init__(
         self,
@@ -65,16 +66,10 @@ class KinoDynamic:
         *,
         timed: bool = False,
     ) -> None:
-        self.robot = robot
-        self.model = model
-        self.settings = settings
+        super().__init__(robot, model, settings, options, library)
         self.variant = variant
         self.timed = timed
-        self.options = options
-        self.library = library
         self._joint_inertia = joint_inertia(robot)
-        self._problems: dict[bytes, Problem] = {}
-        self._kinds: dict[tuple, StageKind] = {}
 
     def solve(
         self, schedule: Schedule, reference: Reference, guess: TakeOffTrajectory
@@ -86,13 +81,6 @@ class KinoDynamic:
     def violation(self, schedule: Schedule, reference: Reference, trajectory: TakeOffTrajectory) -> float:
         """Return by how much ``trajectory`` misses any constraint of the problem, SI units."""
         return self.problem(schedule).violation(self._stages(schedule, reference, trajectory))
-
-    def problem(self, schedule: Schedule) -> Problem:
-        """Return the problem of a schedule, built at its first use."""
-        key = schedule.contact.tobytes() + schedule.phase.tobytes() + bytes([schedule.flight_knots])
-        if key not in self._problems:
-            self._problems[key] = Problem(self.kinds(schedule), self.options, self.library)
-        return self._problems[key]
 
     def kinds(self, schedule: Schedule) -> list[StageKind]:
         """Return the stage kind of each knot."""

@@ -16,6 +16,7 @@ from aerial_model import rotation
 from aerial_model.contact import friction_pyramid
 from aerial_model.robot import Robot
 from aerial_planner.compiled import FunctionLibrary
+from aerial_planner.formulation import Formulation
 from aerial_planner.inverse_kinematics import InverseKinematics
 from aerial_planner.knots import mean_com
 from aerial_planner.reference import Reference
@@ -30,13 +31,13 @@ from aerial_planner.symbolic import (
     rotation_matrix,
 )
 from aerial_planner.trajectory import TakeOffTrajectory
-from aerial_planner.transcription import Problem, Solution, SolverOptions
+from aerial_planner.transcription import Solution, SolverOptions
 
 _REACH_SAMPLES = 2000  # random poses from which the longest leg is read
 
 
-class SingleRigidBody:
-    """Builds and solves the single-rigid-body problems of one robot; a problem is built once per contact schedule."""
+class SingleRigidBody(Formulation):
+    """Builds and solves the single-rigid-body problems of one robot."""
 
     def __init__(
         self,
@@ -47,18 +48,12 @@ class SingleRigidBody:
         options: SolverOptions,
         library: FunctionLibrary | None = None,
     ) -> None:
-        self.robot = robot
-        self.model = model
+        super().__init__(robot, model, settings, options, library)
         self.ik = ik
-        self.settings = settings
-        self.options = options
-        self.library = library
         home = robot.poses["home"]
         self.inertia = np.asarray(model.inertia(home))  # (3, 3) about the centre of mass, in B [kg·m²]
         self.inertia_inverse = np.linalg.inv(self.inertia)
         self.attachment, self.leg_length = _legs(robot, model)  # (n_c, 3) from the centre of mass in B; (n_c,) [m]
-        self._problems: dict[bytes, Problem] = {}
-        self._kinds: dict[tuple, StageKind] = {}
 
     def solve(self, schedule: Schedule, reference: Reference) -> tuple[TakeOffTrajectory, Solution]:
         """Return the optimum near the reference, with joint trajectories, and the solver's account of it."""
@@ -86,13 +81,6 @@ class SingleRigidBody:
             flight_joint_position=reference.flight_path.at_knots(pose),
             flight_angular_velocity=np.zeros((M, 3)),
         )
-
-    def problem(self, schedule: Schedule) -> Problem:
-        """Return the problem of a schedule, built at its first use."""
-        key = schedule.contact.tobytes() + bytes([schedule.flight_knots])
-        if key not in self._problems:
-            self._problems[key] = Problem(self.kinds(schedule), self.options, self.library)
-        return self._problems[key]
 
     def kinds(self, schedule: Schedule) -> list[StageKind]:
         """Return the stage kind of each knot."""

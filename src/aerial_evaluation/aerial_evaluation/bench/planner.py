@@ -6,11 +6,14 @@ from collections.abc import Callable, Iterator, Sequence
 
 from aerial_evaluation.bench.goals import goals
 from aerial_evaluation.bench.literal import literal
+from aerial_evaluation.bench.memory import memory
 from aerial_evaluation.bench.peer import crocoddyl
 from aerial_evaluation.bench.profiles import profiles
 from aerial_evaluation.bench.samples import Row
 from aerial_evaluation.bench.scaling import knots, robots
+from aerial_evaluation.bench.stored import library
 from aerial_evaluation.bench.subject import Subject
+from aerial_evaluation.bench.timing import timing
 from aerial_evaluation.bench.variants import variants
 
 SECTIONS: dict[str, Callable[[Subject], list[Row]]] = {
@@ -20,6 +23,9 @@ SECTIONS: dict[str, Callable[[Subject], list[Row]]] = {
     "knots": knots,
     "robots": robots,
     "goals": goals,
+    "library": library,
+    "timing": timing,
+    "memory": memory,
     "profiles": profiles,
 }
 
