@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from abc import ABC, abstractmethod
 
 from aerial_model.robot import Robot
@@ -11,6 +12,8 @@ from aerial_planner.settings import PlannerSettings
 from aerial_planner.stage import StageKind
 from aerial_planner.symbolic import BaseFrameModel
 from aerial_planner.transcription import Problem, SolverOptions
+
+_NEAR = {"initial_barrier": 1e-2, "bound_distance": 0.1}  # SolverOptions for a guess that is nearly the optimum
 
 
 class Formulation(ABC):
@@ -44,9 +47,10 @@ class Formulation(ABC):
     def kinds(self, schedule: Schedule) -> list[StageKind]:
         """Return the stage kind of each knot."""
 
-    def problem(self, schedule: Schedule) -> Problem:
-        """Return the problem of a schedule, built at its first use."""
-        key = schedule.contact.tobytes() + schedule.phase.tobytes() + bytes([schedule.flight_knots])
+    def problem(self, schedule: Schedule, *, near: bool = False) -> Problem:
+        """Return the problem of a schedule, built at its first use; ``near``: for guesses near the optimum."""
+        key = schedule.contact.tobytes() + schedule.phase.tobytes() + bytes([schedule.flight_knots, near])
         if key not in self._problems:
-            self._problems[key] = Problem(self.kinds(schedule), self.options, self.library)
+            options = dataclasses.replace(self.options, **_NEAR) if near else self.options
+            self._problems[key] = Problem(self.kinds(schedule), options, self.library)
         return self._problems[key]

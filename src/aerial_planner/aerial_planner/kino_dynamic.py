@@ -72,10 +72,13 @@ class KinoDynamic(Formulation):
         self._joint_inertia = joint_inertia(robot)
 
     def solve(
-        self, schedule: Schedule, reference: Reference, guess: TakeOffTrajectory
+        self, schedule: Schedule, reference: Reference, guess: TakeOffTrajectory, *, near: bool = False
     ) -> tuple[TakeOffTrajectory, Solution]:
-        """Return the optimum near ``guess`` and the solver's account of it; check the latter before using the former."""
-        solution = self.problem(schedule).solve(self._stages(schedule, reference, guess))
+        """Return the optimum near ``guess`` and the solver's account of it; check the latter before using the former.
+
+        ``near``: the guess is the optimum of a similar problem, and within its limits.
+        """
+        solution = self.problem(schedule, near=near).solve(self._stages(schedule, reference, guess))
         return self._trajectory(schedule, solution), solution
 
     def violation(self, schedule: Schedule, reference: Reference, trajectory: TakeOffTrajectory) -> float:

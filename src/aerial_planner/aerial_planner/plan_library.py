@@ -24,7 +24,7 @@ from aerial_planner.reference import FlightPath, Reference
 from aerial_planner.schedule import Schedule
 from aerial_planner.trajectory import TakeOffTrajectory
 
-_NEAR = 2.0  # distance up to which a stored plan is the better start, see decision 8
+_NEAR = 1.5  # distance up to which a stored plan is the better start, see decision 8
 _SPACING = 0.1  # distance to a stored plan below which another one adds nothing
 _SUFFIX = ".npz"
 _SAME_TIME = 1e-6  # [s]

@@ -154,6 +154,8 @@ class Planner:
         schedule = self._schedule(request, load_motion(request.motion))
         self._srbm.problem(schedule)
         self._stage(request).problem(schedule)
+        if self.plans is not None:
+            self._stage(request).problem(schedule, near=True)
 
     def compile(self, requests: Iterable[MotionRequest], progress: Callable[[str], None]) -> int:
         """Compile what plans of these requests evaluate, unless it is there; return how many stage kinds that were.
@@ -237,7 +239,7 @@ class Planner:
         stored = self.plans.nearest(schedule, reference) if self.plans is not None and request.warm_start else None
         if stored is not None:
             clock.started_from = "library"
-            take_off, solution = self._optimize(stage, schedule, reference, stored, progress, clock)
+            take_off, solution = self._optimize(stage, schedule, reference, stored, progress, clock, near=True)
             if solution.max_violation <= VIOLATION_TOLERANCE:
                 return take_off, solution
         guess = self._guess(request, schedule, reference, progress, clock)
@@ -272,9 +274,11 @@ class Planner:
         guess: TakeOffTrajectory,
         progress: Progress,
         clock: _Clock,
+        *,
+        near: bool = False,
     ) -> tuple[TakeOffTrajectory, Solution]:
         began = time.perf_counter()
-        take_off, solution = stage.solve(schedule, reference, guess)
+        take_off, solution = stage.solve(schedule, reference, guess, near=near)
         clock.solve += time.perf_counter() - began
         clock.iterations += solution.iterations
         progress("kino_dynamic", clock.iterations, solution.max_violation)

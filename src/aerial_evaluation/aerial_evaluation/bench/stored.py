@@ -36,6 +36,8 @@ def library(subject: Subject) -> list[Row]:
         reach = find_reach(family, subject.planner)
         with tempfile.TemporaryDirectory() as folder:
             stored = _filled(subject, family, reach, Path(folder))
+            subject.planner.plans = stored
+            subject.planner.warm_up(family.request(np.zeros(len(family.axes))))
             samples = _measured(subject, family, draw(reach, subject.goals, subject.seed), stored)
         for start, measured in samples.items():
             found = sum(sample.report.started_from == "library" for sample in measured)
