@@ -149,6 +149,15 @@ _TABLES = {
             "reach [m, turns]": _reach,
         },
     ),
+    "reach": _Table(
+        "Reach of the jump: by direction on flat ground, then onto a platform ahead; what binds just beyond",
+        {
+            "direction": lambda row: f"{row['direction_deg']:.0f}°",
+            "distance": lambda row: f"{row['distance_m']:.2f} m",
+            "height": lambda row: f"{row['height_m']:.2f} m",
+            "what binds": lambda row: row["binds"].rpartition("what binds: ")[2],
+        },
+    ),
     "library": _Table(
         "Starts of AAKD*: the bare reference, a single rigid body, the nearest of a few stored plans",
         {

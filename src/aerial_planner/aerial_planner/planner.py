@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
@@ -125,7 +126,10 @@ class Planner:
         self.options = SolverOptions(solver=solver, max_iterations=_ITERATIONS_MAX)
         self._model = base_frame_model(robot)
         self._ik = InverseKinematics(robot, self._model)
-        self._srbm = SingleRigidBody(robot, self._model, self._ik, self.settings, self.options, self._library)
+        near = dataclasses.replace(
+            self.options, initial_barrier=0.01, bound_distance=0.1
+        )  # the body knows fewer limits
+        self._srbm = SingleRigidBody(robot, self._model, self._ik, self.settings, near, self._library)
         self._collisions = CollisionModel(robot)
         self._kino_dynamic: dict[tuple[Variant, bool], KinoDynamic] = {}
 

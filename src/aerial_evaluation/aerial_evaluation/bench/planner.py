@@ -9,6 +9,7 @@ from aerial_evaluation.bench.literal import literal
 from aerial_evaluation.bench.memory import memory
 from aerial_evaluation.bench.peer import crocoddyl
 from aerial_evaluation.bench.profiles import profiles
+from aerial_evaluation.bench.reach import reach
 from aerial_evaluation.bench.samples import Row
 from aerial_evaluation.bench.scaling import knots, robots
 from aerial_evaluation.bench.stored import library
@@ -23,6 +24,7 @@ SECTIONS: dict[str, Callable[[Subject], list[Row]]] = {
     "knots": knots,
     "robots": robots,
     "goals": goals,
+    "reach": reach,
     "library": library,
     "timing": timing,
     "memory": memory,
