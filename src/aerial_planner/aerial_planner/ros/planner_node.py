@@ -5,6 +5,7 @@ Every selection gets an answer, whatever it holds, and nothing it holds ends the
 
 from __future__ import annotations
 
+import time
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -34,6 +35,9 @@ from aerial_planner.plan_library import PlanLibrary
 from aerial_planner.planner import Planner
 from aerial_planner.ros.worker import Worker
 from aerial_planner.schedule import known_motions
+
+DISCOVERY_TIMEOUT = 5.0  # for a controller to be found that has just started, on a busy machine [s]
+DISCOVERY_PERIOD = 0.01  # between two looks [s]
 
 
 class _CancelledError(Exception):
@@ -144,7 +148,14 @@ class PlannerNode(node.AerialNode):
     def _plan(self, selection: MotionSelection, start: Estimate | None) -> None:
         result = self._planner.plan(selection_from_message(selection), start)
         self._answer(selection, MotionResult.PLANNED)
+        self._await_controller()
         self._plans.publish(plan_to_message(result.plan, self._robot))
+
+    def _await_controller(self) -> None:
+        """Wait until somebody listens for plans: on a busy machine nodes find each other after they have started."""
+        deadline = time.monotonic() + DISCOVERY_TIMEOUT
+        while self._plans.get_subscription_count() == 0 and time.monotonic() < deadline:
+            time.sleep(DISCOVERY_PERIOD)
 
     def _answer(self, selection: MotionSelection, outcome: int, refusal: RefusalError | None = None) -> None:
         self._counts["planned" if refusal is None else "refused"] += 1

@@ -39,7 +39,7 @@ ROUND_TRIP_WINDOW = 64  # states whose answers are timed, however late
 WATCH_PERIOD = 0.1  # wall time between two looks at what time waits for [s]
 REPEAT_PERIOD = 0.5  # wall time after which an unanswered state is published again, while time stands still [s]
 PLAN_TIMEOUT = 10.0  # wall time for which lock-step waits for the answer to a selection … [s]
-START_TIMEOUT = 1.0  # … and, once it is planned, for the controller's [s]
+START_TIMEOUT = 8.0  # … and, once it is planned, for the controller's [s]
 MICRO = 1e6  # microseconds in a second
 _FINAL = (MotionResult.REFUSED, MotionResult.LANDED, MotionResult.FAILED, MotionResult.ABORTED)
 
