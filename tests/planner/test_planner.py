@@ -20,6 +20,7 @@ from .conftest import jump
 G = np.array([0.0, 0.0, -9.81])
 POSITION_TOLERANCE = 1e-4  # [m]
 FOOT_TOLERANCE = 0.01  # of the landing feet's centre: they hang from a body that may be half a degree off level [m]
+FORCE_FROM_NOWHERE = 0.1  # of the weight; with (3.8) at the knots a roll needed 0.33
 MOMENTUM_TOLERANCE = 1e-4  # [kg·m²/s]
 REFUSAL_ITERATIONS = 80  # that a refusal may take; an iteration is some 15 ms
 
@@ -61,6 +62,28 @@ def test_a_front_flip_leaves_the_ground_last_from_its_front_feet(planner, robot)
     plan = planner.plan(MotionRequest(motion="front_flip")).plan
     last = plan.contact[np.searchsorted(plan.time, plan.take_off_time - 1e-9) - 1]
     assert [point.name for point, on in zip(robot.contact_points, last, strict=True) if on] == ["fr", "fl"]
+
+
+@pytest.mark.parametrize("motion", ["spin", "barrel_roll", "front_flip"])
+def test_the_accelerations_of_a_turning_motion_need_no_force_from_nowhere(planner, motion):
+    use = planner.plan(MotionRequest(motion=motion)).actuator_use
+    assert use.base_wrench_error < FORCE_FROM_NOWHERE
+
+
+@pytest.mark.parametrize("turns", [1.0, -1.0])
+def test_feet_that_have_left_the_ground_keep_clear_of_it_while_others_push(planner, turns):
+    plan = planner.plan(MotionRequest(motion="barrel_roll", rotation=turns)).plan
+    settings, step = planner.settings, plan.time[1]
+    lifted = np.cumsum(~plan.contact, axis=0) * step > settings.swing_rise_time + 1.5 * step
+    pushing = plan.contact.any(axis=1)
+    rise = (plan.foot_position - plan.foot_position[0])[..., 2]
+    assert np.any(lifted & pushing[:, None])
+    assert np.all(rise[lifted & pushing[:, None]] > settings.swing_clearance - POSITION_TOLERANCE)
+
+
+def test_a_roll_to_the_other_side_lands_on_the_other_side(planner):
+    right, left = (planner.plan(MotionRequest(motion="barrel_roll", rotation=turns)).plan for turns in (1.0, -1.0))
+    np.testing.assert_allclose(left.landing_support_centre, right.landing_support_centre * [1, -1, 1])
 
 
 @pytest.fixture(scope="module", params=GOALS, ids=lambda goal: goal[0])

@@ -100,6 +100,16 @@ def test_phases_follow_the_plans_times(standing, hop):
     assert phases.count(Phase.FLIGHT) == pytest.approx((hop.landing_time - hop.take_off_time) / PERIOD, abs=1)
 
 
+@pytest.mark.parametrize("rounding", [-1e-12, 1e-12])
+def test_a_phase_begins_with_its_tick_however_times_are_rounded(standing, hop, rounding):
+    time = hop.time + rounding * (hop.time == hop.take_off_time)
+    plan = dataclasses.replace(hop, time=time, take_off_time=hop.take_off_time + rounding)
+    standing.controller.accept(plan)
+    begin = len(standing.phases)
+    standing.run(plan.take_off_time + PERIOD)
+    assert standing.phases[begin:].count(Phase.TAKE_OFF) == round(plan.take_off_time / PERIOD)
+
+
 def test_equal_seeds_give_equal_commands_to_the_last_bit(robot, hop):
     def torques():
         loop = Loop(robot, seed=3)

@@ -46,7 +46,7 @@ def assemble(
     nearest that satisfy A_G q̇ = [α; m ṙ] and J_c q̇ = 0 exactly.
     """
     N = len(schedule.contact)
-    rates, omega = take_off.joint_velocity, take_off.angular_velocity
+    rates, omega = _at_knots(take_off.joint_velocity), _at_knots(take_off.angular_velocity)
     momentum = np.hstack([robot.mass * take_off.com_velocity, take_off.angular_momentum])  # linear first
     q = _configurations(model, take_off.com, take_off.orientation, take_off.joint_position)
     data = robot.model.createData()
@@ -117,6 +117,13 @@ def assemble(
         terrain=request.terrain,
         request_id=request.request_id,
     )
+
+
+def _at_knots(rates: np.ndarray) -> np.ndarray:
+    """Return velocities at the knots ``(N+1, m)`` from rest, given those of Euler's steps between them, and the last."""
+    velocity = np.vstack([np.zeros(rates.shape[1]), rates[1:]])
+    velocity[1:-1] = 0.5 * (rates[:-2] + rates[1:-1])
+    return velocity
 
 
 def accumulated_rotation(time: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:

@@ -127,7 +127,6 @@ class KinoDynamic(Formulation):
             cost *= s.stretch  # as an integral's share: else the longest time would be the cheapest
 
         rows = Rows()
-        R = s.R
         if touching is None:
             rows.equal("start", s.motion - s.x_0)
         else:
@@ -142,7 +141,7 @@ class KinoDynamic(Formulation):
                     # The link above the foot, too: its other end no lower than where it may stand on the foot.
                     rise = (feet[2, i] - s.foot_ref[2, i]) / lengths[i] + slopes[i]
                     rows.between("ground", rise, settings.link_slope, np.inf)
-        rows.equal("momentum", R.T @ s.alpha - self.model.angular_momentum(s.q_j, s.omega, s.dq_j))  # (3.8)
+        rows.equal("momentum", s.momentum_gap(self.model))  # (3.8)
         pyramid = friction_pyramid(robot.friction_coefficient)[:4]
         for i in np.flatnonzero(loaded):
             rows.between("friction", ca.DM(pyramid) @ s.force[i], 0.0, np.inf)  # (3.9b, c)
@@ -266,13 +265,15 @@ class KinoDynamic(Formulation):
         x, x_min, x_max = np.hstack([x, stretch]), np.hstack([x_min, least]), np.hstack([x_max, greatest])
         ends = np.append(np.diff(schedule.phase) != 0, False)
         foot_ref = reference.foot_position.ravel()
+        ground = np.tile(reference.foot_position, (N, 1, 1))  # and above which height feet in the air must be
+        ground[..., 2] += reference.foot_clearance
         path = reference.flight_path
         stages = []
         for k in range(N):
             loaded = schedule.contact[k]
             n_f = int(loaded.sum())
             p = [[schedule.dt], reference.com[k], reference.com_velocity[k], reference.orientation[k]]
-            p += [reference.joint_position[k], reference.x_0[-n:], foot_ref, reference.x_0, np.zeros(n)]
+            p += [reference.joint_position[k], reference.x_0[-n:], ground[k].ravel(), reference.x_0, np.zeros(n)]
             u = [guess.angular_velocity[k], guess.joint_velocity[k], guess.force[k][loaded].ravel()]
             force_min = np.tile([-np.inf, -np.inf, settings.force_min], n_f)
             force_max = np.tile([np.inf, np.inf, settings.force_max], n_f)

@@ -90,19 +90,29 @@ class TakeOffKnot:
     def R(self) -> ca.SX:  # noqa: N802
         return rotation_matrix(self.quaternion)
 
+    @property
+    def alpha_dot(self) -> ca.SX:
+        """Mean moment of the forces over the interval, constant as they are (3.5)."""
+        middle = mean_com(self.r, self.rdot, self.dt)
+        return sum((ca.cross(self.foot_ref[:, i] - middle, f) for i, f in self.force.items()), ca.SX.zeros(3))
+
+    def momentum_gap(self, model: BaseFrameModel) -> ca.SX:
+        """Return Rᵀα − α_B at mid-interval (3.8), where a step's mean rates are the rates."""
+        R_mid = rotation_matrix(quaternion_product(self.quaternion, quaternion_step(self.omega, 0.5 * self.dt)))
+        q_mid = self.q_j + 0.5 * self.dt * self.dq_j
+        alpha_mid = self.alpha + 0.5 * self.dt * self.alpha_dot
+        return R_mid.T @ alpha_mid - model.angular_momentum(q_mid, self.omega, self.dq_j)
+
     def step(self, mass: float) -> ca.SX:
         """Return the next state: (3.5) and (3.6); momentum is exact for forces that are constant over the interval."""
         rddot = -ca.vertcat(0, 0, GRAVITY)
-        alpha_dot = ca.SX.zeros(3)
-        middle = mean_com(self.r, self.rdot, self.dt)
-        for i, f in self.force.items():
+        for f in self.force.values():
             rddot += f / mass
-            alpha_dot += ca.cross(self.foot_ref[:, i] - middle, f)
         rdot_next = self.rdot + rddot * self.dt
         return ca.vertcat(
             self.r + 0.5 * (self.rdot + rdot_next) * self.dt,
             rdot_next,
-            self.alpha + alpha_dot * self.dt,
+            self.alpha + self.alpha_dot * self.dt,
             quaternion_product(self.quaternion, quaternion_step(self.omega, self.dt)),
             self.q_j + self.dq_j * self.dt,
             self.dq_j,

@@ -64,6 +64,7 @@ class Reference:
     flight_orientation: np.ndarray  # (M+1, 4)
     joint_position: np.ndarray  # (N+1, n) [rad]
     foot_position: np.ndarray  # (n_c, 3) of the standing robot [m]
+    foot_clearance: np.ndarray  # (N, n_c) that feet in the air keep over where they stood [m]
     x_0: np.ndarray  # (13 + n,) initial state r, ṙ, α, quaternion, q_j
     landing_com: np.ndarray  # (3,) of the centre of mass at touchdown [m]
     landing_com_height: float  # above the landing surface, to hold after landing [m]
@@ -114,6 +115,7 @@ def body_reference(
         flight_orientation=rotation.multiply(rotation.exp(flight_turned[:, None] * schedule.rotation), quaternion),
         joint_position=np.tile(q_j, (N + 1, 1)),
         foot_position=feet,
+        foot_clearance=_foot_clearance(schedule, settings),
         x_0=np.concatenate([com_0, np.zeros(6), quaternion, q_j]),
         landing_com=landing_com - lead,
         landing_com_height=height,
@@ -129,6 +131,15 @@ def _landing_stance(robot: Robot, model: BaseFrameModel) -> tuple[np.ndarray, fl
     feet = feet - [*feet[:, :2].mean(axis=0), 0.0]
     radius = np.mean([point.radius for point in robot.contact_points])
     return feet, float(radius - feet[:, 2].mean())
+
+
+def _foot_clearance(schedule: Schedule, settings: PlannerSettings) -> np.ndarray:
+    """Return the height ``(N, n_c)`` [m] over where they stood that feet in the air keep while others push.
+
+    Without it the optimum lets them hover on the ground, where the least error of the attitude makes them push.
+    """
+    lifted = np.cumsum(~schedule.contact, axis=0) * schedule.dt - schedule.dt  # [s]
+    return settings.swing_clearance * np.clip(lifted / settings.swing_rise_time, 0.0, 1.0)
 
 
 def _hermite(

@@ -65,6 +65,13 @@ class Motion:
     rotation: RotationRule | None = None  # a motion that turns
     displacement: np.ndarray = field(default_factory=lambda: np.zeros(3))  # where the request says nothing [m]
 
+    def usual_displacement(self, turns: float) -> np.ndarray:
+        """Return where to land ``(3,)`` [m] if the request does not say: a turn the other way is the mirror image."""
+        if self.rotation is None or turns * self.rotation.turns >= 0:
+            return self.displacement
+        across = np.cross([0.0, 0.0, 1.0], self.rotation.axis)
+        return self.displacement - 2 * (self.displacement @ across) * across
+
 
 @dataclass(frozen=True, kw_only=True)
 class Schedule:
@@ -150,7 +157,7 @@ def contact_schedule(
     masks = np.array([_contacts(phase.contacts, names, turns) for phase in motion.take_off])
     knots = [max(1, round(phase.duration / dt)) for phase in motion.take_off]
     ranges = [phase.duration_range or (n * dt, n * dt) for phase, n in zip(motion.take_off, knots, strict=True)]
-    displacement = request.displacement if np.any(request.displacement) else motion.displacement
+    displacement = request.displacement if np.any(request.displacement) else motion.usual_displacement(turns)
     distance = float(np.linalg.norm(displacement[:2]))
     height = float(displacement[2])
     rise = max(height, 0.0) + motion.flight.clearance + motion.flight.clearance_per_distance * distance

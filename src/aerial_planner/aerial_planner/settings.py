@@ -39,6 +39,8 @@ class PlannerSettings:
     link_slope: float = (
         0.25  # least slope (sine) of a link that stands on a contact: flatter, it would touch the ground
     )
+    swing_clearance: float = 0.02  # of feet in the air from the ground while others push [m]
+    swing_rise_time: float = 0.04  # in which a foot that has left the ground reaches it [s]
     reach: float = 0.97  # β of (3.18): share of the longest leg the single-rigid-body stage may use
     landing_lead: float = 0.05  # time by which landing feet are set ahead of the centre of mass along its velocity [s]
     weights: Weights = field(default_factory=Weights)

@@ -132,8 +132,12 @@ class LiteralProblem:
             self.opti.subject_to(self.r[:, k] == self.base[:, k] + R @ self.model.com(q_j))  # (3.7)
             feet = ca.repmat(self.base[:, k], 1, self.robot.n_contacts) + R @ self.model.feet(q_j)
             self.opti.subject_to(self.c[:, k] == ca.vec(feet))
-            momentum = self.model.angular_momentum(q_j, self.omega[:, k], self.dq_j[:, k])
-            self.opti.subject_to(self.alpha[:, k] == R @ momentum)  # (3.8)
+            omega, dq_j, alpha = self.omega[:, k], self.dq_j[:, k], self.alpha[:, k]
+            if k < self.N:  # at mid-interval, where a step's mean rates are the rates
+                half = 0.5 * self.schedule.dt
+                R = rotation_matrix(quaternion_product(self.quaternion[:, k], quaternion_step(omega, half)))
+                q_j, alpha = q_j + half * dq_j, alpha + half * self.alpha_dot[:, k]
+            self.opti.subject_to(alpha == R @ self.model.angular_momentum(q_j, omega, dq_j))  # (3.8)
 
     def _contacts(self) -> None:
         mu, subject_to = self.robot.friction_coefficient, self.opti.subject_to
@@ -149,7 +153,7 @@ class LiteralProblem:
                     if k < self.N:
                         subject_to(slopes[i] >= self.settings.link_slope)
                 elif not loaded and 0 < k < self.N:
-                    rise = self.c[3 * i + 2, k] - feet[i, 2]
+                    rise = self.c[3 * i + 2, k] - feet[i, 2] - self.reference.foot_clearance[k, i]
                     subject_to(rise >= 0)  # (3.10)
                     subject_to(rise / lengths[i] + slopes[i] >= self.settings.link_slope)
                 force = self.f[rows, k]

@@ -31,6 +31,7 @@ class Phase(IntEnum):
 
 
 FOLLOWING = (Phase.TAKE_OFF, Phase.FLIGHT)  # a plan gives the target
+_INSTANT = 1e-6  # [s] clock and plan are sums of steps: times that are meant to be equal differ by rounding
 
 
 class Phases:
@@ -61,6 +62,11 @@ class Phases:
     def time_in_plan(self) -> float:
         """Time since the plan that runs began [s]; 0 when none does."""
         return 0.0 if self._plan_begin is None else self._time - self._plan_begin
+
+    @property
+    def _plan_time(self) -> float:
+        """The same, such that a phase that should begin with this tick does."""
+        return self.time_in_plan + _INSTANT
 
     @property
     def settled(self) -> bool:
@@ -122,22 +128,22 @@ class Phases:
             return
         if self._plan_begin is None:
             self._plan_begin = time
-        if self.time_in_plan >= self.plan.landing_time:
+        if self._plan_time >= self.plan.landing_time:
             self._com_height = self.plan.landing_com_height
             self.phase, self._next_way = Phase.LANDING, self._to_stance
-        elif self.time_in_plan >= self.plan.take_off_time:
+        elif self._plan_time >= self.plan.take_off_time:
             self.phase = Phase.FLIGHT
 
     def contacts(self) -> np.ndarray:
         """Return the points that carry load now, by the schedule ``(n_c,)`` bool."""
         if self.phase is Phase.TAKE_OFF:
-            return self.plan.contact[self.plan.interval(self.time_in_plan)]
+            return self.plan.contact[self.plan.interval(self._plan_time)]
         return self._no_point if self.phase is Phase.FLIGHT else self._all_points
 
     def target(self, state: Configuration) -> WholeBodyTarget | PostureTarget | None:
         """Return what to do now, seen where the robot is; None: nothing but to damp the joints."""
         if self.phase in FOLLOWING:
-            return from_plan(self.plan.sample(self.time_in_plan), self._gains.follow)
+            return from_plan(self.plan.sample(self._plan_time), self._gains.follow)
         if self._next_way is not None:
             self._way, self._next_way = self._next_way(state), None
         if isinstance(self._way, Hold) and state.R_WB[2, 2] < self._upright_min:

@@ -21,7 +21,7 @@ from aerial_model.request import LOWER_MARGIN, UPPER_MARGIN, MotionRequest
 from aerial_model.robot import Robot
 from aerial_planner.kino_dynamic import Variant
 from aerial_planner.planner import Planner
-from aerial_planner.schedule import Motion, load_motion
+from aerial_planner.schedule import load_motion
 
 SHARE = 0.8  # of the reach along each axis within which goals are drawn
 _HALVINGS = 5  # of the search for a reach
@@ -133,7 +133,12 @@ def families(robot: Robot, motion: str) -> list[Family]:
     turns = said.rotation.turns
     return [
         Family(name=motion, axes=plane, bound=bound, request=_level(motion, said.displacement, turns)),
-        Family(name=f"{motion} reversed", axes=plane, bound=bound, request=_level(motion, _mirrored(said), -turns)),
+        Family(
+            name=f"{motion} reversed",
+            axes=plane,
+            bound=bound,
+            request=_level(motion, said.usual_displacement(-turns), -turns),
+        ),
     ]
 
 
@@ -161,9 +166,3 @@ def _heights(robot: Robot, motion: str, side: str, bound: float) -> Family:
         return level.with_platform(robot) if goal[0] != 0 else level
 
     return Family(name=f"{motion} {side} onto or off", axes=("z",), bound=np.array([bound]), request=request)
-
-
-def _mirrored(said: Motion) -> np.ndarray:
-    """Return the usual displacement ``(3,)`` of the turn to the other side."""
-    across = np.cross(_VERTICAL, said.rotation.axis)
-    return said.displacement - 2 * (said.displacement @ across) * across
