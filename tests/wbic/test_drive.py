@@ -84,6 +84,18 @@ def test_a_voltage_beyond_the_bus_counts_too(robot, drive, state_at):
     assert drive.saturated_ticks == 1
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_torques_at_the_end_of_their_room_ask_for_the_share_of_the_limits(robot, gains, drive, state_at, seed):
+    state, v_ref = state_at(seed), np.random.default_rng(seed).normal(0, 5, robot.model.nv)
+    measurement, law = measured(state), robot.actuators
+    along = gains.joint_damping * (v_ref - state.v)[JOINT_VELOCITY]
+    along += law.friction(v_ref[JOINT_VELOCITY], gains.stiction_speed)
+    for torque in drive.room(v_ref, measurement):
+        requested = torque + along
+        use = np.maximum(law.torque_ratio(requested), law.voltage_ratio(requested, measurement.joint_velocity))
+        np.testing.assert_allclose(use, gains.actuator_share)
+
+
 def test_a_stopped_robot_only_resists_motion(gains, drive, state_at):
     command = drive.resting(None, measured(state_at(0)))
     assert not command.torque.any()

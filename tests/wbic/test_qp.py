@@ -11,12 +11,13 @@ from scipy.optimize import nnls
 
 from aerial_model.contact import friction_pyramid
 from aerial_model.robot import BASE_TWIST
-from aerial_wbic.qp import ForceOptimization, Solution
+from aerial_wbic.qp import ForceOptimization, Room, Solution, inverse_dynamics
 from aerial_wbic.target import shared_load
 
 EQUATION_TOLERANCE = 1e-8  # [N], [N·m]
 FORCE_TOLERANCE = 0.1  # that a force may leave the pyramid [N]
 GRADIENT_TOLERANCE = 0.03  # of the cost's gradient, relative to its largest part
+ROOM_TOLERANCE = 0.5  # by which a torque may leave its room [N·m], or a force the pyramid on that account [N]
 ACTIVE = 0.3  # slack below which a face of the pyramid is taken to bear [N]
 
 contacts = st.lists(st.booleans(), min_size=4, max_size=4).map(np.array)
@@ -123,3 +124,47 @@ def test_the_fallback_keeps_the_pyramid_and_the_equations_of_motion(optimization
     assert not solution.solved
     assert (solution.force @ friction_pyramid(robot.friction_coefficient).T).min() > -FORCE_TOLERANCE
     np.testing.assert_allclose(residual(state, solution), 0.0, atol=EQUATION_TOLERANCE)
+
+
+def landing(state):
+    """An upward acceleration of the base that asks for half as much again as the knees can give."""
+    vdot_cmd = np.zeros(len(state.v))
+    vdot_cmd[2] = 40.0
+    return vdot_cmd, shared_load(state, np.array([0.0, 0.0, 40.0]))
+
+
+def room_of(state, torque):
+    return Room(np.full(len(state.v) - 6, -torque), np.full(len(state.v) - 6, torque))
+
+
+@any_state
+@given(seed=st.integers(0, 10**6), contact=contacts.filter(np.any))
+def test_torques_stay_in_their_room(optimization, robot, state_at, seed, contact):
+    state = state_at(seed)
+    wish = *landing(state), contact
+    plain = optimization.solve(state, *wish)
+    without = inverse_dynamics(state, optimization.solve(state, wish[0], 0 * wish[1], np.zeros(4, dtype=bool)))
+    room = room_of(state, 12.0)
+    limited = optimization.within(room, plain, state, *wish)
+    torque, bearing = inverse_dynamics(state, limited), np.repeat(contact, 3)
+    assert np.all(torque[bearing] < np.maximum(room.greatest, without)[bearing] + ROOM_TOLERANCE)
+    assert np.all(torque[bearing] > np.minimum(room.least, without)[bearing] - ROOM_TOLERANCE)
+    assert (limited.force @ friction_pyramid(robot.friction_coefficient).T).min() > -ROOM_TOLERANCE
+    np.testing.assert_allclose(residual(state, limited), 0.0, atol=EQUATION_TOLERANCE)
+
+
+def test_with_too_little_room_the_robot_brakes_as_hard_as_it_can(optimization, state_at):
+    state = state_at(moving=False)
+    contact = np.ones(4, dtype=bool)
+    plain = optimization.solve(state, *landing(state), contact)
+    assert np.abs(inverse_dynamics(state, plain)).max() > 15.0
+    limited = optimization.within(room_of(state, 15.0), plain, state, *landing(state), contact)
+    assert np.abs(inverse_dynamics(state, limited)).max() == pytest.approx(15.0, abs=ROOM_TOLERANCE)
+    assert limited.force[:, 2].sum() < plain.force[:, 2].sum()
+
+
+def test_with_enough_room_nothing_changes(optimization, state_at):
+    state = state_at(moving=False)
+    contact = np.ones(4, dtype=bool)
+    plain = optimization.solve(state, *landing(state), contact)
+    assert optimization.within(room_of(state, 50.0), plain, state, *landing(state), contact) is plain

@@ -9,6 +9,7 @@ import dataclasses
 import sys
 from pathlib import Path
 
+import numpy as np
 from numba.core.dispatcher import Dispatcher
 
 from aerial_model.plan_file import load_plan
@@ -16,6 +17,7 @@ from aerial_model.robot import BASE_POSITION, Robot
 from aerial_sim.simulation import Simulation
 from aerial_wbic.controller import Controller
 
+WEIGHT = np.array([0.0, 0.0, -600.0])  # [N] falls on the trunk
 STAND, MOTION, BEND = 100, 1000, 900  # ticks
 
 
@@ -27,7 +29,7 @@ def versions() -> dict[str, int]:
 
 
 def main(plan_file: Path) -> None:
-    """Stand, abort, follow a plan with and without localization, lie down, stand up, stop."""
+    """Stand, bear more than the motors can, abort, follow a plan with and without localization, lie down, stand up, stop."""
     robot = Robot.load("mini_cheetah")
     plan = load_plan(plan_file, robot)
     simulation, controller = Simulation(robot), Controller(robot)
@@ -43,6 +45,8 @@ def main(plan_file: Path) -> None:
             measurement = simulation.step(controller.step(measurement))
 
     go(STAND)
+    simulation.disturb(WEIGHT, 0.1)
+    go(MOTION)
     controller.accept(plan)
     go(STAND)
     controller.abort()

@@ -65,11 +65,7 @@ class ActuatorLaw:
 
         Beyond the no-load speed the interval lies wholly on the braking side, still within ±τ_max.
         """
-        back_emf = self.volts_per_speed * speed
-        lower = (-self.bus_voltage - back_emf) / self.volts_per_torque
-        upper = (self.bus_voltage - back_emf) / self.volts_per_torque
-        limit = self.torque_max
-        return np.maximum(np.minimum(lower, limit), -limit), np.maximum(np.minimum(upper, limit), -limit)
+        return torque_bounds_of(speed, self.torque_max, self.bus_voltage, self.volts_per_torque, self.volts_per_speed)
 
     def available(self, torque: np.ndarray, speed: np.ndarray) -> np.ndarray:
         """Return the torque ``(..., n)`` [N·m] the motors deliver when ``torque`` is asked for at joint ``speed``."""
@@ -109,3 +105,18 @@ def voltage_of(
 def friction_of(speed: np.ndarray, damping: np.ndarray, dry_friction: np.ndarray, stiction_speed: float) -> np.ndarray:
     """Return the joint torque [N·m] that friction takes at joint ``speed`` [rad/s], Coulomb's sign smoothed."""
     return damping * speed + dry_friction * np.tanh(speed / stiction_speed)
+
+
+def torque_bounds_of(
+    speed: np.ndarray,
+    torque_max: np.ndarray,
+    bus_voltage: np.ndarray,
+    volts_per_torque: np.ndarray,
+    volts_per_speed: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the least and the greatest torque [N·m] available at joint ``speed`` [rad/s]."""
+    back_emf = volts_per_speed * speed
+    lower = (-bus_voltage - back_emf) / volts_per_torque
+    upper = (bus_voltage - back_emf) / volts_per_torque
+    least = np.maximum(np.minimum(lower, torque_max), -torque_max)
+    return least, np.maximum(np.minimum(upper, torque_max), -torque_max)

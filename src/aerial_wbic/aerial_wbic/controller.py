@@ -23,7 +23,7 @@ from aerial_wbic.drive import Drive
 from aerial_wbic.estimator import Estimator
 from aerial_wbic.gains import ControllerGains
 from aerial_wbic.phase import FOLLOWING, Phase, Phases
-from aerial_wbic.qp import ForceOptimization
+from aerial_wbic.qp import ForceOptimization, Room
 from aerial_wbic.target import GRAVITY, Fold, PostureTarget, WholeBodyTarget
 from aerial_wbic.tasks import Limbs, attitude_error, command
 
@@ -91,6 +91,8 @@ class Controller:
         vdot_cmd, v_ref = command(state, target, swinging, gains.swing_joint, gains.angular_momentum_damping)
         solution = self._qp.solve(state, vdot_cmd, target.force, target.contact)
         self._fallback_ticks += not solution.solved
+        room = self._drive.room(v_ref, measurement)
+        solution = self._qp.within(room, solution, state, vdot_cmd, target.force, target.contact)
         return self._drive.command(state, solution, v_ref, measurement)
 
     def accept(self, plan: Plan) -> None:
@@ -164,7 +166,7 @@ class Controller:
         )
 
     def _rehearse(self) -> None:
-        """Stand for two ticks, report and begin to fold the legs, so that whatever must be compiled is."""
+        """Stand for two ticks, once without torque to spare, report and begin to fold the legs: all is compiled then."""
         q = self.robot.standing_configuration()
         still, joints = np.zeros(3), np.zeros(self.robot.n_joints)
         for tick in range(2):
@@ -181,6 +183,8 @@ class Controller:
             )
             self.step(measurement)
         state, target = self._now
+        wish = state, np.zeros(self.robot.model.nv), target.force, target.contact
+        self._qp.within(Room(joints, joints), self._qp.solve(*wish), *wish)
         attitude_error(target.body.orientation, state.base_orientation)
         Fold(state, 0.0, rate=1.0, pose=joints).at(0.0, state)
 

@@ -13,11 +13,12 @@ from aerial_model.robot import JOINT_VELOCITY, Robot
 from aerial_model.state import Command, Measurement
 from aerial_wbic.compiled import compiled
 from aerial_wbic.gains import ControllerGains
-from aerial_wbic.qp import Solution
+from aerial_wbic.qp import Room, Solution, inverse_dynamics
 from aerial_wbic.target import PostureTarget
 
 _friction_of = compiled(actuator.friction_of)
 _voltage_of = compiled(actuator.voltage_of)
+_torque_bounds_of = compiled(actuator.torque_bounds_of)
 
 
 class _Law(NamedTuple):
@@ -47,6 +48,7 @@ class Drive:
         self._law = _Law.of(robot.actuators, gains.stiction_speed)
         n = robot.n_joints
         self._zeros = np.zeros(n)
+        self._share = gains.actuator_share
         self._joint_damping = np.full(n, gains.joint_damping)
         self._posture_stiffness = np.full(n, gains.posture_stiffness)
         self._stop_damping = np.full(n, gains.stop_damping)
@@ -81,6 +83,15 @@ class Drive:
             state_sequence=measurement.sequence,
         )
 
+    def room(self, v_ref: np.ndarray, measurement: Measurement) -> Room:
+        """Return the torques that inverse dynamics may ask for, given what friction and damping take of the limits.
+
+        Args:
+            v_ref: q̇_ref ``(nv,)``.
+            measurement: that is answered.
+        """
+        return _room(v_ref[JOINT_VELOCITY], measurement.joint_velocity, self._joint_damping, self._share, self._law)
+
     def resting(self, posture: PostureTarget | None, measurement: Measurement) -> Command:
         """Return the command of a robot that does not stand: joints go to a posture, or only resist motion."""
         return Command(
@@ -92,6 +103,23 @@ class Drive:
             state_time=measurement.time,
             state_sequence=measurement.sequence,
         )
+
+
+@compiled
+def _room(
+    velocity: np.ndarray, measured_velocity: np.ndarray, joint_damping: np.ndarray, share: float, law: _Law
+) -> Room:
+    """Return the torques that keep a ``share`` of the limits, less what rides along with them."""
+    least, greatest = _torque_bounds_of(
+        measured_velocity,
+        share * law.torque_max,
+        share * law.bus_voltage,
+        law.volts_per_torque,
+        law.volts_per_speed,
+    )
+    along = _friction_of(velocity, law.damping, law.dry_friction, law.stiction_speed)
+    along += joint_damping * (velocity - measured_velocity)
+    return Room(least - along, greatest - along)
 
 
 @compiled
@@ -118,13 +146,3 @@ def _torque(
         if abs(requested[j]) > law.torque_max[j] or abs(voltage[j]) > law.bus_voltage[j]:
             saturated = 1
     return torque, saturated
-
-
-@compiled
-def inverse_dynamics(state: Configuration, solution: Solution) -> np.ndarray:
-    """Return the joint torques ``(n,)`` [N·m], the joint rows of H q̈ + C q̇ + G − Σ J_c,iᵀ f_i, thesis (2.2)."""
-    torque = state.M[JOINT_VELOCITY] @ solution.vdot + state.nle[JOINT_VELOCITY]
-    for i in range(len(solution.force)):
-        for k in range(3):
-            torque -= solution.force[i, k] * state.J_contacts[i, k, JOINT_VELOCITY]
-    return torque

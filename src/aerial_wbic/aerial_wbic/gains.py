@@ -43,6 +43,7 @@ class ControllerGains:
     angular_momentum_damping: float  # K_d,CAM of (3.29) [1/s]
     weight_base: float  # Q_1 of (3.24) [1/(m/s²)²]
     weight_force: float  # Q_2 of (3.24) [1/N²]
+    actuator_share: float  # of torque and voltage limits that limbs under load may be asked for
     joint_damping: float  # rides along on the motor boards [N·m·s/rad]
     posture_stiffness: float  # of the joints while the legs are folded to stand up [N·m/rad]
     stop_damping: float  # of the joints when stopped or lying [N·m·s/rad]

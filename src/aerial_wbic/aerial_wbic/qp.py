@@ -19,10 +19,12 @@ from scipy import sparse
 
 from aerial_model.contact import friction_pyramid
 from aerial_model.kinematics import Configuration
-from aerial_model.robot import BASE_TWIST, Robot
+from aerial_model.robot import BASE_TWIST, JOINT_VELOCITY, Robot
 from aerial_wbic.compiled import cholesky, cholesky_solve, compiled
 
 _N_BASE = 6
+_LEVER = 0.2  # [m] by which torques are divided, so that their rows are as large as those of forces
+_INFINITY = osqp.constant("OSQP_INFTY")
 _SETTINGS = {
     "verbose": False,
     "scaling": 0,  # done here
@@ -49,6 +51,13 @@ class Solution(NamedTuple):
     solved: bool  # False: the fallback's forces
 
 
+class Room(NamedTuple):
+    """Joint torques that the motors can add to what else is asked of them."""
+
+    least: np.ndarray  # (n,) [N·m]
+    greatest: np.ndarray  # (n,) [N·m]
+
+
 class ForceOptimization:
     """The quadratic program of one robot.
 
@@ -60,7 +69,9 @@ class ForceOptimization:
 
     def __init__(self, robot: Robot, weight_base: float, weight_force: float) -> None:
         pyramid = friction_pyramid(robot.friction_coefficient)
-        self._programs = [_Program(n, pyramid, weight_base, weight_force) for n in range(1, robot.n_contacts + 1)]
+        numbers = range(1, robot.n_contacts + 1)
+        self._programs = [_Program(n, 0, pyramid, weight_base, weight_force) for n in numbers]
+        self._limited = [_Program(n, robot.n_joints, pyramid, weight_base, weight_force) for n in numbers]
         self._friction = float(pyramid[0, 2])
 
     def solve(self, state: Configuration, vdot_cmd: np.ndarray, f_cmd: np.ndarray, contact: np.ndarray) -> Solution:
@@ -80,30 +91,55 @@ class ForceOptimization:
         force, vdot = _outcome(state, vdot_cmd, f_cmd, contact, df if solved else _NO_FORCE, solved, self._friction)
         return Solution(vdot, force, solved)
 
+    def within(
+        self,
+        room: Room,
+        solution: Solution,
+        state: Configuration,
+        vdot_cmd: np.ndarray,
+        f_cmd: np.ndarray,
+        contact: np.ndarray,
+    ) -> Solution:
+        """Return ``solution`` if the motors have room for its torques, else the solution of (3.24) with limits.
+
+        Limits are those of the limbs that bear load; what no force on them could keep is not asked for. The rest as
+        for ``solve``.
+        """
+        if not contact.any() or not _exceeds(state, solution, room):
+            return solution
+        df = self._limited[np.count_nonzero(contact) - 1].solve(state, vdot_cmd, f_cmd, contact, room)
+        if df is None:
+            return solution
+        force, vdot = _outcome(state, vdot_cmd, f_cmd, contact, df, True, self._friction)
+        return Solution(vdot, force, solution.solved)
+
 
 _NO_FORCE = np.zeros(0)
 
 
 class _Program:
-    """OSQP for ``n`` loaded points.
+    """OSQP for ``n`` loaded points and the limits of ``n_limits`` joints, all of them or none.
 
-    Variables: [√Q_1 δ_q (6); √Q_2 δ_f (3 n)]; rows: [equations of motion (6); pyramids (5 n)].
+    Variables: [√Q_1 δ_q (6); √Q_2 δ_f (3 n)]; rows: [equations of motion (6); pyramids (5 n); torques (n_limits)].
     """
 
-    def __init__(self, n: int, pyramid: np.ndarray, weight_base: float, weight_force: float) -> None:
+    def __init__(self, n: int, n_limits: int, pyramid: np.ndarray, weight_base: float, weight_force: float) -> None:
         self._pyramid = pyramid
         self._root_base, self._root_force = float(np.sqrt(weight_base)), float(np.sqrt(weight_force))
-        variables, rows = _N_BASE + 3 * n, _N_BASE + len(pyramid) * n
+        variables, limits = _N_BASE + 3 * n, _N_BASE + len(pyramid) * n
+        rows = limits + n_limits
         A = np.zeros((rows, variables))
         A[:_N_BASE, :_N_BASE] = np.eye(_N_BASE)
         A[:_N_BASE, _N_BASE:] = 1.0  # dense: changes with the state
-        A[_N_BASE:, _N_BASE:] = np.kron(np.eye(n), pyramid) / self._root_force
+        A[_N_BASE:limits, _N_BASE:] = np.kron(np.eye(n), pyramid) / self._root_force
+        A[limits:] = 1.0  # dense: changes with the state
         self._A = sparse.csc_matrix(A)
         column = np.repeat(np.arange(variables), np.diff(self._A.indptr))
         changing = (self._A.indices < _N_BASE) & (column >= _N_BASE)
         self._changing = np.flatnonzero(changing).reshape(3 * n, _N_BASE)  # by column
+        self._limits = np.flatnonzero(self._A.indices >= limits).reshape(variables, n_limits)  # by column
         self._lower = np.zeros(rows)
-        self._upper = np.full(rows, osqp.constant("OSQP_INFTY"))
+        self._upper = np.full(rows, _INFINITY)
         self._solver = osqp.OSQP()
         self._solver.setup(
             sparse.eye(variables, format="csc"),
@@ -117,14 +153,21 @@ class _Program:
         self._core = self._solver._solver  # OSQP itself: the wrapper's bookkeeping takes longer than the solution
 
     def solve(
-        self, state: Configuration, vdot_cmd: np.ndarray, f_cmd: np.ndarray, contact: np.ndarray
+        self,
+        state: Configuration,
+        vdot_cmd: np.ndarray,
+        f_cmd: np.ndarray,
+        contact: np.ndarray,
+        room: Room | None = None,
     ) -> np.ndarray | None:
-        """Return δ_f ``(3 n,)`` [N] of the loaded points, or None; arguments as those of the whole."""
+        """Return δ_f ``(3 n,)`` [N] of the loaded points, or None; ``room`` for one with limits, the rest as of the whole."""
         root_base, root_force = self._root_base, self._root_force
         A, lower, upper = self._A.data, self._lower, self._upper
         _state_problem(
             state, vdot_cmd, f_cmd, contact, self._pyramid, root_base, root_force, self._changing, A, lower, upper
         )
+        if room is not None:
+            _state_limits(state, vdot_cmd, f_cmd, contact, room, root_base, root_force, self._limits, A, lower, upper)
         self._core.update_data_vec(q=None, l=lower, u=upper)
         self._core.update_data_mat(P_x=None, P_i=None, A_x=A, A_i=None)
         x = self._minimum()
@@ -178,6 +221,70 @@ def _state_problem(
     for n, i in enumerate(loaded):
         begin = _N_BASE + n * rows
         lower[begin : begin + rows] = -(pyramid @ f_cmd[i])
+
+
+@compiled
+def _state_limits(
+    state: Configuration,
+    vdot_cmd: np.ndarray,
+    f_cmd: np.ndarray,
+    contact: np.ndarray,
+    room: Room,
+    root_base: float,
+    root_force: float,
+    limits: np.ndarray,
+    A: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+) -> None:
+    """Write the rows of the torques into the entries ``limits`` ``(6 + 3 n, n)`` of A and into the bounds.
+
+    They say least ≤ τ_cmd + H_jb δ_q − J_jᵀ δ_f ≤ greatest, the bounds moved apart to admit the torques without force.
+    """
+    loaded = np.flatnonzero(contact)
+    n_joints = limits.shape[1]
+    begin = len(lower) - n_joints
+    force = np.zeros_like(f_cmd)
+    free = np.empty((_N_BASE, 1))
+    free[:, 0] = _missing(state, vdot_cmd, force, contact)
+    _solve_base(state, free)
+    for i in loaded:
+        force[i] = f_cmd[i]
+    torque_cmd = inverse_dynamics(state, Solution(vdot_cmd, force, True))
+    for j in range(n_joints):
+        row = JOINT_VELOCITY.start + j
+        without = state.M[row] @ vdot_cmd + state.nle[row]
+        for c in range(_N_BASE):
+            A[limits[c, j]] = state.M[row, c] / (_LEVER * root_base)
+            without += state.M[row, c] * free[c, 0]
+        bears = False
+        for n, i in enumerate(loaded):
+            for k in range(3):
+                slope = state.J_contacts[i, k, row]
+                bears |= slope != 0.0
+                A[limits[_N_BASE + 3 * n + k, j]] = -slope / (_LEVER * root_force)
+        if bears:
+            lower[begin + j] = (min(room.least[j], without) - torque_cmd[j]) / _LEVER
+            upper[begin + j] = (max(room.greatest[j], without) - torque_cmd[j]) / _LEVER
+        else:
+            lower[begin + j], upper[begin + j] = -_INFINITY, _INFINITY
+
+
+@compiled
+def _exceeds(state: Configuration, solution: Solution, room: Room) -> bool:
+    """Return whether a torque leaves the room."""
+    torque = inverse_dynamics(state, solution)
+    return bool(np.any(torque < room.least) or np.any(torque > room.greatest))
+
+
+@compiled
+def inverse_dynamics(state: Configuration, solution: Solution) -> np.ndarray:
+    """Return the joint torques ``(n,)`` [N·m], the joint rows of H q̈ + C q̇ + G − Σ J_c,iᵀ f_i, thesis (2.2)."""
+    torque = state.M[JOINT_VELOCITY] @ solution.vdot + state.nle[JOINT_VELOCITY]
+    for i in range(len(solution.force)):
+        for k in range(3):
+            torque -= solution.force[i, k] * state.J_contacts[i, k, JOINT_VELOCITY]
+    return torque
 
 
 @compiled
