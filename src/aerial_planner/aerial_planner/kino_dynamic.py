@@ -193,8 +193,11 @@ class KinoDynamic(Formulation):
         s = TakeOffKnot(robot, self.model, (False,) * robot.n_contacts, in_flight=True, timed=self.timed)
         rows = Rows()
         feet = world_feet(self.model, s)
-        for i in np.flatnonzero(touching):
-            rows.equal("feet", feet[:, i] - s.foot_ref[:, i])
+        for i in range(robot.n_contacts):
+            if touching[i]:
+                rows.equal("feet", feet[:, i] - s.foot_ref[:, i])
+            else:
+                rows.between("ground", feet[2, i] - s.foot_ref[2, i], 0.0, np.inf)
         landing = s.r + s.flight_time * s.rdot - ca.vertcat(0, 0, 0.5 * GRAVITY * s.flight_time**2)
         rows.equal("landing position", landing - s.landing_com)
         flight = FlightKnot(s.alpha, s.quaternion, s.q_j, s.flight_time, s.omega, s.flight_p)
@@ -264,8 +267,7 @@ class KinoDynamic(Formulation):
         stretch, least, greatest = self._stretches(schedule, guess)  # (N+1, 0 or 1) each
         x, x_min, x_max = np.hstack([x, stretch]), np.hstack([x_min, least]), np.hstack([x_max, greatest])
         ends = np.append(np.diff(schedule.phase) != 0, False)
-        foot_ref = reference.foot_position.ravel()
-        ground = np.tile(reference.foot_position, (N, 1, 1))  # and above which height feet in the air must be
+        ground = np.tile(reference.foot_position, (N + 1, 1, 1))  # and above which height feet in the air must be
         ground[..., 2] += reference.foot_clearance
         path = reference.flight_path
         stages = []
@@ -291,7 +293,7 @@ class KinoDynamic(Formulation):
                     u_max=np.concatenate(u_max),
                 )
             )
-        p = [[schedule.dt], foot_ref, [schedule.flight_time], reference.landing_com, path.parameters(0)]
+        p = [[schedule.dt], ground[N].ravel(), [schedule.flight_time], reference.landing_com, path.parameters(0)]
         T = [guess.flight_time]
         u = [guess.flight_angular_velocity[0], guess.angular_velocity[-1], guess.joint_velocity[-1], T]
         shortest, longest = schedule.flight_time_range

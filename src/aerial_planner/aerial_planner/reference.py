@@ -64,7 +64,7 @@ class Reference:
     flight_orientation: np.ndarray  # (M+1, 4)
     joint_position: np.ndarray  # (N+1, n) [rad]
     foot_position: np.ndarray  # (n_c, 3) of the standing robot [m]
-    foot_clearance: np.ndarray  # (N, n_c) that feet in the air keep over where they stood [m]
+    foot_clearance: np.ndarray  # (N+1, n_c) that feet in the air keep over where they stood [m]
     x_0: np.ndarray  # (13 + n,) initial state r, ṙ, α, quaternion, q_j
     landing_com: np.ndarray  # (3,) of the centre of mass at touchdown [m]
     landing_com_height: float  # above the landing surface, to hold after landing [m]
@@ -134,11 +134,11 @@ def _landing_stance(robot: Robot, model: BaseFrameModel) -> tuple[np.ndarray, fl
 
 
 def _foot_clearance(schedule: Schedule, settings: PlannerSettings) -> np.ndarray:
-    """Return the height ``(N, n_c)`` [m] over where they stood that feet in the air keep while others push.
+    """Return the height ``(N+1, n_c)`` [m] over where they stood that feet in the air keep while others push.
 
     Without it the optimum lets them hover on the ground, where the least error of the attitude makes them push.
     """
-    lifted = np.cumsum(~schedule.contact, axis=0) * schedule.dt - schedule.dt  # [s]
+    lifted = schedule.dt * np.vstack([np.zeros_like(schedule.contact[:1]), np.cumsum(~schedule.contact, axis=0)])  # [s]
     return settings.swing_clearance * np.clip(lifted / settings.swing_rise_time, 0.0, 1.0)
 
 

@@ -152,10 +152,11 @@ class LiteralProblem:
                     subject_to(self.c[rows, k] == feet[i])  # (3.9a): where it stood before
                     if k < self.N:
                         subject_to(slopes[i] >= self.settings.link_slope)
-                elif not loaded and 0 < k < self.N:
+                elif not loaded and k > 0:
                     rise = self.c[3 * i + 2, k] - feet[i, 2] - self.reference.foot_clearance[k, i]
                     subject_to(rise >= 0)  # (3.10)
-                    subject_to(rise / lengths[i] + slopes[i] >= self.settings.link_slope)
+                    if k < self.N:
+                        subject_to(rise / lengths[i] + slopes[i] >= self.settings.link_slope)
                 force = self.f[rows, k]
                 if loaded:
                     subject_to(self.opti.bounded(-mu * force[2], force[0], mu * force[2]))  # (3.9b)

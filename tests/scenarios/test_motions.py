@@ -1,4 +1,4 @@
-"""Whole jumps in closed loop: planner, controller and simulator with nominal noise, judged from ground truth."""
+"""Whole motions in closed loop: planner, controller and simulator with nominal noise, judged from ground truth."""
 
 import numpy as np
 import pytest
@@ -32,6 +32,23 @@ def jump(robot, *displacement, **options):
 )
 def test_a_jump_lands(robot, planner, displacement):
     outcome = run(robot, jump(robot, *displacement), seed=1, planner=planner)
+    assert outcome.landing.failed == ()
+
+
+@pytest.mark.parametrize(
+    ("motion", "goal"),
+    [
+        ("spin", {"rotation": -0.5}),
+        ("barrel_roll", {}),
+        ("barrel_roll", {"rotation": -1.0}),
+        ("barrel_roll", {"displacement": np.array([0.0, -0.35, 0.0])}),
+        ("front_flip", {}),
+        ("back_flip", {}),
+    ],
+    ids=["spin right", "roll right", "roll left", "far roll", "front flip", "back flip"],
+)
+def test_a_turning_motion_lands(robot, planner, motion, goal):
+    outcome = run(robot, MotionRequest(motion=motion, **goal), seed=1, planner=planner)
     assert outcome.landing.failed == ()
 
 
