@@ -198,4 +198,4 @@ def test_a_state_that_makes_no_sense_is_ignored(running, robot, until):
     before = operator.statuses[-1].ticks
     until(lambda: operator.statuses[-1].ticks > before + 100)
     assert operator.statuses[-1].missed_ticks < 1000  # not the million that the sequence number claims
-    assert wbic.diagnose()[1] != "no state arrives"
+    until(lambda: wbic.diagnose()[1] != "no state arrives")  # a machine that is busy may be silent for a moment
