@@ -17,6 +17,7 @@ from aerial_planner.schedule import GRAVITY, Schedule
 from aerial_planner.symbolic import BaseFrameModel
 from aerial_planner.trajectory import TakeOffTrajectory
 
+_FLIGHT_STEP = 0.01  # of the flight's integration and of the plan's samples there [s]
 _STICTION_SPEED = 0.1  # smoothing of Coulomb friction in exact torques [rad/s]
 
 
@@ -30,6 +31,11 @@ class ActuatorUse:
     voltage_ratio: np.ndarray  # (K-1, n)
     speed_ratio: np.ndarray  # (K-1, n)
     base_wrench_error: float  # largest force the plan's accelerations would need from nowhere, as a share of the weight
+
+    @property
+    def worst(self) -> float:
+        """Greatest torque or voltage over its limit."""
+        return float(max(self.torque_ratio.max(), self.voltage_ratio.max()))
 
 
 def assemble(
@@ -67,7 +73,7 @@ def assemble(
         angular_momentum=take_off.angular_momentum[-1],
         joint_position=take_off.joint_position[-1],
         joint_velocity=v[-1, JOINT_VELOCITY],
-        step=schedule.dt,
+        step=_FLIGHT_STEP,
     )
     t = flight.time[:, None]
     fall = np.array([0.0, 0.0, GRAVITY])

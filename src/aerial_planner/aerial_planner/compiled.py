@@ -1,7 +1,7 @@
 """Stage functions compiled to machine code, on disk: three times faster to evaluate, and no derivatives to make.
 
-A library is valid for one robot, one set of settings, one CasADi and one state of the formulation's source; all of them
-are in its fingerprint, and with it in the name of its folder. Where a function is not compiled, the interpreted one is
+A library is valid for one robot, one set of weights and margins, one CasADi and one state of the formulation's source; all
+of them are in its fingerprint, and with it in the name of its folder. Where a function is not compiled, the interpreted one is
 used. Compiling takes a C compiler and some seconds a stage kind, and is asked for, never done behind one's back.
 """
 
@@ -30,6 +30,18 @@ _NAMES = ("values", "gradient", "jacobian", "hessian")
 # Two passes of -O1 take time with the square of a function's length and gain nothing on straight-line code.
 _FLAGS = ("-O1", "-fno-tree-dominator-opts", "-fno-tree-pre", "-fPIC", "-shared")
 _SOURCES = ("symbolic.py", "stage.py", "knots.py", "srbm.py", "kino_dynamic.py")  # what the functions are made from
+# Settings that reach the functions as parameters and the solver as bounds, with each request.
+_GIVEN = {
+    "dt",
+    "flight_knots",
+    "margin",
+    "speed_margin",
+    "force_max",
+    "force_min",
+    "swing_clearance",
+    "swing_rise_time",
+    "landing_lead",
+}
 
 
 class CompilationError(AerialError):
@@ -92,7 +104,8 @@ class FunctionLibrary:
 def _fingerprint(robot: Robot, settings: PlannerSettings) -> str:
     digest = hashlib.sha256()
     here = Path(__file__).parent
-    parts = [robot.model_hash, repr(asdict(settings)), ca.__version__, platform.machine(), " ".join(_FLAGS)]
+    numbers = {name: value for name, value in asdict(settings).items() if name not in _GIVEN}
+    parts = [robot.model_hash, repr(numbers), ca.__version__, platform.machine(), " ".join(_FLAGS)]
     digest.update("\n".join(parts).encode())
     for source in _SOURCES:
         digest.update((here / source).read_bytes())

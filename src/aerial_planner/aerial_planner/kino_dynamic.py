@@ -6,15 +6,16 @@ by construction; accelerations and α̇ are expressions. What stays are the mome
 (3.9a), as equalities of a knot.
 
     take-off knot   x = [r, ṙ, α, quaternion, q_j, q̇_j of the knot before],   u = [ω, q̇_j, f of the loaded contacts]
-    lift-off knot   x as above,   u = [ω in flight, ω and q̇_j on the ground, the flight time T]
+    its last        x as above,   u = [as above, q̇_j at which the contacts end, of the joints that hold them]
+    lift-off knot   x as above, with these rates,   u = [ω in flight, ω on the ground, the flight time T]
     flight knot     x = [α, quaternion, q_j, T],   u = [ω]
 
 With timing optimized, x has the factor by which the phase's time steps differ from the schedule's, constant but for the
 last knot of a phase, whose u sets that of the next; the cost of a knot is weighted with it, as an integral's would be.
 
 The rates of the knot before give the joint accelerations: the torque limits then hold for −Jᵀf *and* the inertia of the
-legs, whose mass matrix is taken at the home pose. With (3.14) alone, which neglects it, unloaded legs whip around for
-free and the last force before lift-off becomes an impulse that no leg could follow.
+legs (``knots.LegInertia``). With (3.14) alone, which neglects it, unloaded legs whip around for free and the last force
+before lift-off becomes an impulse that no leg could follow.
 
 In flight the legs follow a given path from the take-off pose through the tuck to the landing pose and turn the body
 against them; because these knots are in the problem, the attitude at touchdown is the goal's, legs included.
@@ -31,7 +32,15 @@ from aerial_model.contact import friction_pyramid
 from aerial_model.robot import Robot
 from aerial_planner.compiled import FunctionLibrary
 from aerial_planner.formulation import Formulation
-from aerial_planner.knots import FlightKnot, TakeOffKnot, foot_velocities, joint_inertia, link_slopes, world_feet
+from aerial_planner.knots import (
+    FlightKnot,
+    LegInertia,
+    TakeOffKnot,
+    foot_velocities,
+    holding_joints,
+    link_slopes,
+    world_feet,
+)
 from aerial_planner.reference import Reference
 from aerial_planner.schedule import GRAVITY, Schedule, contact_bits
 from aerial_planner.settings import PlannerSettings
@@ -69,27 +78,40 @@ class KinoDynamic(Formulation):
         super().__init__(robot, model, settings, options, library)
         self.variant = variant
         self.timed = timed
-        self._joint_inertia = joint_inertia(robot)
+        self._leg_inertia = LegInertia.of(robot)
 
     def solve(
-        self, schedule: Schedule, reference: Reference, guess: TakeOffTrajectory, *, near: bool = False
+        self,
+        schedule: Schedule,
+        reference: Reference,
+        guess: TakeOffTrajectory,
+        *,
+        near: bool = False,
+        margin: float | None = None,
     ) -> tuple[TakeOffTrajectory, Solution]:
         """Return the optimum near ``guess`` and the solver's account of it; check the latter before using the former.
 
-        ``near``: the guess is the optimum of a similar problem, and within its limits.
+        Args:
+            schedule: contacts and flight.
+            reference: what (3.4) measures deviations from.
+            guess: where to start.
+            near: the guess is the optimum of a similar problem, and within its limits.
+            margin: share of torque and voltage limits that may be used; None: the settings'.
         """
-        solution = self.problem(schedule, near=near).solve(self._stages(schedule, reference, guess))
+        margin = self.settings.margin if margin is None else margin
+        solution = self.problem(schedule, near=near).solve(self._stages(schedule, reference, guess, margin))
         return self._trajectory(schedule, solution), solution
 
     def violation(self, schedule: Schedule, reference: Reference, trajectory: TakeOffTrajectory) -> float:
         """Return by how much ``trajectory`` misses any constraint of the problem, SI units."""
-        return self.problem(schedule).violation(self._stages(schedule, reference, trajectory))
+        return self.problem(schedule).violation(self._stages(schedule, reference, trajectory, self.settings.margin))
 
     def kinds(self, schedule: Schedule) -> list[StageKind]:
         """Return the stage kind of each knot."""
         sets = _contact_sets(schedule)
         ends = np.append(np.diff(schedule.phase) != 0, False)
         kinds = [self._take_off_kind(*pair, ends_phase=bool(end)) for pair, end in zip(sets, ends, strict=True)]
+        kinds[-1] = self._take_off_kind(*sets[-1], last=True)
         kinds.append(self._lift_off_kind(sets[-1][1]))
         kinds += [self._flight_kind()] * (schedule.flight_knots - 1)
         return [*kinds, self._touchdown_kind()]
@@ -97,16 +119,16 @@ class KinoDynamic(Formulation):
     # --- stage kinds: variables, objective, dynamics, constraints ---------------------------------------------------
 
     def _take_off_kind(
-        self, touching: tuple[bool, ...] | None, loaded: tuple[bool, ...], *, ends_phase: bool
+        self, touching: tuple[bool, ...] | None, loaded: tuple[bool, ...], *, ends_phase: bool = False, last: bool = False
     ) -> StageKind:
         """Return the knot whose ``touching`` contacts are held and ``loaded`` ones push; touching None: the first knot."""
         ends_phase = ends_phase and self.timed  # else it makes no difference
-        key = ("take_off", touching, loaded, ends_phase)
+        key = ("take_off", touching, loaded, ends_phase, last)
         if key in self._kinds:
             return self._kinds[key]
         robot, settings = self.robot, self.settings
         n_c = robot.n_contacts
-        s = TakeOffKnot(robot, self.model, loaded, timed=self.timed, ends_phase=ends_phase)
+        s = TakeOffKnot(robot, self.model, loaded, last=last, timed=self.timed, ends_phase=ends_phase)
 
         dr = s.r - s.r_ref
         dv = s.rdot - s.rdot_ref
@@ -120,7 +142,7 @@ class KinoDynamic(Formulation):
             + w.joint_position * ca.sumsqr(dq)
             + w.angular_velocity * ca.sumsqr(s.omega)
             + w.joint_velocity * ca.sumsqr(s.dq_j)
-            + w.joint_acceleration * ca.sumsqr(s.ddq_j)
+            + w.joint_acceleration * (ca.sumsqr(s.ddq_j) + ca.sumsqr(s.ddq_j_end))
             + w.force * ca.sumsqr(s.f)
         )
         if self.timed:
@@ -148,15 +170,9 @@ class KinoDynamic(Formulation):
         if self.variant is not Variant.KD:
             self._actuator_rows(rows, s, loaded)
 
-        following = s.step(robot.mass)
-        kind = rows.stage(
-            f"take_off_{contact_bits(touching)}_{contact_bits(loaded)}_{self._name}{'_end' if ends_phase else ''}",
-            s.x,
-            s.u,
-            s.p,
-            cost,
-            following,
-        )
+        name = f"take_off_{contact_bits(touching)}_{contact_bits(loaded)}_{self._name}"
+        name += "_last" if last else "_end" if ends_phase else ""
+        kind = rows.stage(name, s.x, s.u, s.p, cost, s.step(robot.mass))
         self._kinds[key] = kind
         return kind
 
@@ -165,24 +181,21 @@ class KinoDynamic(Formulation):
         return self.variant.name + ("_timed" if self.timed else "")
 
     def _actuator_rows(self, rows: Rows, s: TakeOffKnot, loaded: tuple[bool, ...]) -> None:
-        """Add torque and voltage limits (3.11b, c) of all joints, with τ of (3.14) plus the inertia of the joints."""
-        robot, q_j = self.robot, s.q_j
+        """Add torque and voltage limits (3.11b, c) of all joints at mid-interval, with τ of (3.14) plus the legs' inertia."""
+        robot, law, q_j = self.robot, self.robot.actuators, s.q_j_mid
         if self.variant is Variant.AAKD_STAR:
             frozen = ca.DM(robot.frozen_joints.astype(float))
-            q_j = frozen * s.q_j_frozen + (1 - frozen) * s.q_j
+            q_j = frozen * s.q_j_frozen + (1 - frozen) * q_j
         J = self.model.foot_jacobians(q_j)  # (3 n_c, n) in B
-        torque = ca.DM(self._joint_inertia) @ s.ddq_j
-        for i in np.flatnonzero(loaded):
-            torque -= J[3 * i : 3 * i + 3, :].T @ (s.R.T @ s.force[i])  # (3.14)
-        self._limit_rows(rows, s, torque)
-
-    def _limit_rows(self, rows: Rows, s: TakeOffKnot, torque: ca.SX) -> None:
-        """Add the limits of torque (3.11b) and of the voltage it needs at the joint rates (3.11c)."""
-        law, share = self.robot.actuators, self.settings.margin
-        for joint, name in enumerate(self.robot.joint_names):
-            rows.between(f"{name} torque", torque[joint] / law.torque_max[joint], -share, share)
+        pushing = np.flatnonzero(loaded)
+        force_B = s.R_mid.T @ ca.horzcat(*(s.force[i] for i in pushing))
+        torque = self._leg_inertia.torque(s.ddq_j, force_B, self.model.feet(q_j)[:, pushing.tolist()])
+        for column, i in enumerate(pushing):
+            torque -= J[3 * i : 3 * i + 3, :].T @ force_B[:, column]  # (3.14)
+        for joint, name in enumerate(robot.joint_names):
+            rows.between(f"{name} torque", torque[joint] / law.torque_max[joint] / s.margin, -1.0, 1.0)
             volts = law.volts_per_torque[joint] * torque[joint] + law.volts_per_speed[joint] * s.dq_j[joint]
-            rows.between(f"{name} voltage", volts / law.bus_voltage[joint], -share, share)
+            rows.between(f"{name} voltage", volts / law.bus_voltage[joint] / s.margin, -1.0, 1.0)
 
     def _lift_off_kind(self, touching: tuple[bool, ...]) -> StageKind:
         """Return the knot at which the last contact ends: the ballistic path from here ends at the goal."""
@@ -203,17 +216,14 @@ class KinoDynamic(Formulation):
         flight = FlightKnot(s.alpha, s.quaternion, s.q_j, s.flight_time, s.omega, s.flight_p)
         rows.equal("momentum", flight.momentum_gap(self.model))
         # The rates at which the feet leave the ground: without them the last force could be an impulse no leg follows.
-        rows.equal("momentum", s.R.T @ s.alpha - self.model.angular_momentum(s.q_j, s.omega_ground, s.dq_j))
+        rows.equal("momentum", s.R.T @ s.alpha - self.model.angular_momentum(s.q_j, s.omega_ground, s.dq_before))
         for i, slip in enumerate(foot_velocities(self.model, s)):
             if touching[i]:
                 rows.equal("feet", slip)
-        if self.variant is not Variant.KD:
-            self._limit_rows(rows, s, ca.DM(self._joint_inertia) @ s.ddq_j)
         w = self.settings.weights
         cost = (
             w.angular_velocity * ca.sumsqr(s.omega)
-            + w.joint_velocity * ca.sumsqr(s.dq_j)
-            + w.joint_acceleration * ca.sumsqr(s.ddq_j)
+            + w.joint_velocity * ca.sumsqr(s.dq_before)
             + w.flight_time * (s.flight_time - s.flight_time_ref) ** 2
         )
         kind = rows.stage(f"lift_off_{contact_bits(touching)}_{self._name}", s.x, s.u, s.p, cost, flight.step())
@@ -226,6 +236,7 @@ class KinoDynamic(Formulation):
             robot = self.robot
             alpha, quaternion, q_j = ca.SX.sym("alpha", 3), ca.SX.sym("quat", 4), ca.SX.sym("q_j", robot.n_joints)
             T, omega, p = ca.SX.sym("T"), ca.SX.sym("omega", 3), ca.SX.sym("p", FlightKnot.n_p(robot))
+            quaternion_ref, w = ca.SX.sym("quat_ref", 4), self.settings.weights
             flight = FlightKnot(alpha, quaternion, q_j, T, omega, p)
             rows = Rows()
             rows.equal("momentum", flight.momentum_gap(self.model))
@@ -233,8 +244,9 @@ class KinoDynamic(Formulation):
                 "flight",
                 ca.vertcat(alpha, quaternion, q_j, T),
                 omega,
-                p,
-                self.settings.weights.angular_velocity * ca.sumsqr(omega),
+                ca.vertcat(p, quaternion_ref),
+                w.angular_velocity * ca.sumsqr(omega)
+                + w.orientation * ca.sumsqr(attitude_error(quaternion, quaternion_ref)),
                 flight.step(),
             )
         return self._kinds[key]
@@ -251,7 +263,9 @@ class KinoDynamic(Formulation):
 
     # --- numbers of one request -------------------------------------------------------------------------------------
 
-    def _stages(self, schedule: Schedule, reference: Reference, guess: TakeOffTrajectory) -> list[StageData]:
+    def _stages(
+        self, schedule: Schedule, reference: Reference, guess: TakeOffTrajectory, margin: float
+    ) -> list[StageData]:
         robot, settings = self.robot, self.settings
         n, N, M = robot.n_joints, len(schedule.contact), schedule.flight_knots
         low, high = robot.planning_range
@@ -260,7 +274,9 @@ class KinoDynamic(Formulation):
         x_min[0], x_max[0] = -np.inf, np.inf  # where the robot stands is given
         aware = self.variant is not Variant.KD
         speed = settings.speed_margin * robot.actuators.no_load_speed if aware else np.full(n, np.inf)  # (3.11a)
-        before = np.vstack([np.zeros(n), guess.joint_velocity[:-1]])
+        holding = holding_joints(self.model, schedule.contact[-1])
+        x_min[N, 13 + n :], x_max[N, 13 + n :] = -speed, speed
+        before = np.vstack([np.zeros(n), guess.joint_velocity[: N - 1], guess.joint_velocity[-1]])
         x = np.hstack(
             [guess.com, guess.com_velocity, guess.angular_momentum, guess.orientation, guess.joint_position, before]
         )
@@ -275,12 +291,15 @@ class KinoDynamic(Formulation):
             loaded = schedule.contact[k]
             n_f = int(loaded.sum())
             p = [[schedule.dt], reference.com[k], reference.com_velocity[k], reference.orientation[k]]
-            p += [reference.joint_position[k], reference.x_0[-n:], ground[k].ravel(), reference.x_0, np.zeros(n)]
+            p += [reference.joint_position[k], reference.x_0[-n:], ground[k].ravel(), reference.x_0, np.zeros(n), [margin]]
             u = [guess.angular_velocity[k], guess.joint_velocity[k], guess.force[k][loaded].ravel()]
             force_min = np.tile([-np.inf, -np.inf, settings.force_min], n_f)
             force_max = np.tile([np.inf, np.inf, settings.force_max], n_f)
             u_min, u_max = [np.full(3, -np.inf), -speed, force_min], [np.full(3, np.inf), speed, force_max]
-            if ends[k]:
+            if k == N - 1:
+                free = np.full(holding.sum(), np.inf)
+                u, u_min, u_max = [*u, guess.joint_velocity[-1][holding]], [*u_min, -free], [*u_max, free]
+            elif ends[k]:
                 u, u_min, u_max = [*u, stretch[k + 1]], [*u_min, least[k + 1]], [*u_max, greatest[k + 1]]
             stages.append(
                 StageData(
@@ -295,10 +314,10 @@ class KinoDynamic(Formulation):
             )
         p = [[schedule.dt], ground[N].ravel(), [schedule.flight_time], reference.landing_com, path.parameters(0)]
         T = [guess.flight_time]
-        u = [guess.flight_angular_velocity[0], guess.angular_velocity[-1], guess.joint_velocity[-1], T]
+        u = [guess.flight_angular_velocity[0], guess.angular_velocity[-1], T]
         shortest, longest = schedule.flight_time_range
-        u_min = np.concatenate([np.full(6, -np.inf), -speed, [shortest]])
-        u_max = np.concatenate([np.full(6, np.inf), speed, [longest]])
+        u_min = np.append(np.full(6, -np.inf), shortest)
+        u_max = np.append(np.full(6, np.inf), longest)
         stages.append(
             StageData(
                 p=np.concatenate(p),
@@ -314,7 +333,8 @@ class KinoDynamic(Formulation):
         for k in range(1, M + 1):
             x_k = np.concatenate([guess.angular_momentum[-1], flight[k], T])
             if k < M:
-                stages.append(StageData.free(p=path.parameters(k), x=x_k, u=guess.flight_angular_velocity[k]))
+                p = np.concatenate([path.parameters(k), reference.flight_orientation[k]])
+                stages.append(StageData.free(p=p, x=x_k, u=guess.flight_angular_velocity[k]))
             else:
                 stages.append(StageData.free(p=schedule.landing_orientation, x=x_k))
         return stages
@@ -343,7 +363,7 @@ class KinoDynamic(Formulation):
             orientation=x[:, 9:13],
             joint_position=x[:, 13 : 13 + n],
             angular_velocity=np.array([u[:3] for u in solution.u[:N]] + [solution.u[N][3:6]]),
-            joint_velocity=np.array([u[3 : 3 + n] for u in solution.u[:N]] + [solution.u[N][6:-1]]),
+            joint_velocity=np.array([u[3 : 3 + n] for u in solution.u[:N]] + [x[N, 13 + n : 13 + 2 * n]]),
             flight_time=float(solution.u[N][-1]),
             force=force,
             flight_orientation=flight[:, 3:7],

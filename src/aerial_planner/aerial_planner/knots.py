@@ -3,22 +3,54 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 
 from aerial_model.kinematics import Kinematics
-from aerial_model.robot import JOINT_VELOCITY, Robot
+from aerial_model.robot import BASE_TWIST, JOINT_VELOCITY, Robot
 from aerial_planner.schedule import GRAVITY
 from aerial_planner.symbolic import BaseFrameModel, quaternion_product, quaternion_step, rotation_matrix
 
 _POINT = 1e-3  # a contact nearer to its joint than this stands on no link [m]
 
 
-def joint_inertia(robot: Robot) -> np.ndarray:
-    """Return the joints' block of the mass matrix ``(n, n)`` at the home pose, rotor inertia included [kg·m²]."""
-    q = robot.standing_configuration()
-    return Kinematics(robot).at(q, np.zeros(robot.model.nv)).M[JOINT_VELOCITY, JOINT_VELOCITY]
+@dataclass(frozen=True, kw_only=True)
+class LegInertia:
+    """What (3.14) neglects, from the mass matrix H at the home pose, rotor inertia included.
+
+    With the base rows of the equations of motion solved for the base's acceleration, and their velocity terms left out,
+
+        τ = (H_jj − H_jb H_bb⁻¹ H_bj) q̈_j + H_jb H_bb⁻¹ w − Jᵀ f ,   w = Σ [f_i; c_i × f_i] in B, about the base.
+
+    The second term is large when contacts turn the body fast: in a roll it is a third of the ab/adduction's torque.
+    """
+
+    joint: np.ndarray  # H_jj − H_jb H_bb⁻¹ H_bj (n, n) [kg·m²]
+    wrench_share: np.ndarray  # H_jb H_bb⁻¹ (n, 6), linear first
+
+    @staticmethod
+    def of(robot: Robot) -> LegInertia:
+        """Return it for a robot."""
+        M = Kinematics(robot).at(robot.standing_configuration(), np.zeros(robot.model.nv)).M
+        share = np.linalg.solve(M[BASE_TWIST, BASE_TWIST], M[BASE_TWIST, JOINT_VELOCITY]).T
+        return LegInertia(
+            joint=M[JOINT_VELOCITY, JOINT_VELOCITY] - share @ M[BASE_TWIST, JOINT_VELOCITY], wrench_share=share
+        )
+
+    def torque(self, ddq_j: ca.SX, force_B: ca.SX, feet_B: ca.SX) -> ca.SX:
+        """Return the joint torques ``(n,)`` but for −Jᵀf.
+
+        Args:
+            ddq_j: ``(n,)`` [rad/s²].
+            force_B: of the contacts ``(3, n_c)`` in B [N].
+            feet_B: contact points ``(3, n_c)`` in B [m].
+        """
+        moment = sum(
+            (ca.cross(feet_B[:, i], force_B[:, i]) for i in range(force_B.shape[1])), type(force_B).zeros(3)
+        )
+        return ca.DM(self.joint) @ ddq_j + ca.DM(self.wrench_share) @ ca.vertcat(ca.sum2(force_B), moment)
 
 
 class TakeOffKnot:
@@ -29,6 +61,7 @@ class TakeOffKnot:
         model: its expressions.
         loaded: which contacts push.
         in_flight: the lift-off knot.
+        last: the one before it, whose control has the rates at which the contacts end of the joints that hold them.
         timed: the state has the factor by which all time steps of this phase are longer than the schedule's.
         ends_phase: the control has that of the next phase.
     """
@@ -40,6 +73,7 @@ class TakeOffKnot:
         loaded: Sequence[bool],
         *,
         in_flight: bool = False,
+        last: bool = False,
         timed: bool = False,
         ends_phase: bool = False,
     ) -> None:
@@ -57,24 +91,33 @@ class TakeOffKnot:
         self.x = ca.vertcat(self.motion, self.stretch)
         self.nominal_dt = ca.SX.sym("dt")
         self.dt = self.nominal_dt * self.stretch if timed else self.nominal_dt
-        self.ddq_j = (self.dq_j - self.dq_before) / self.dt
+        # Rates are the means of the steps, those at a knot the mean of the steps before and after it.
+        self.dq_next, gained = self.dq_j, self.dq_j - self.dq_before
+        self.dq_end = ca.SX.sym("dq_end", int(holding_joints(model, loaded).sum()) if last else 0)
+        if last:
+            self.dq_next = 1.5 * self.dq_j - 0.5 * self.dq_before  # joints that hold nothing go on as before
+            self.dq_next[np.flatnonzero(holding_joints(model, loaded)).tolist()] = self.dq_end
+            gained = self.dq_next - 0.5 * (self.dq_before + self.dq_j)
+        self.ddq_j = gained / self.dt
+        self.ddq_j_end = (self.dq_next - self.dq_j) / (0.5 * self.dt)  # of the second half of the last step, else zero
         self.foot_ref = ca.SX.sym("foot_ref", 3, n_c)
         if in_flight:
             self.omega_ground = ca.SX.sym("omega_ground", 3)
             self.flight_time, self.flight_time_ref = ca.SX.sym("T"), ca.SX.sym("T_ref")
-            self.u = ca.vertcat(self.omega, self.omega_ground, self.dq_j, self.flight_time)
+            self.u = ca.vertcat(self.omega, self.omega_ground, self.flight_time)
             self.landing_com = ca.SX.sym("landing_com", 3)
             self.flight_p = ca.SX.sym("flight_p", FlightKnot.n_p(robot))
             landing = (self.flight_time_ref, self.landing_com, self.flight_p)
             self.p = ca.vertcat(self.nominal_dt, ca.vec(self.foot_ref), *landing)
             return
-        self.u = ca.vertcat(self.omega, self.dq_j, self.f)
+        self.u = ca.vertcat(self.omega, self.dq_j, self.f, self.dq_end)
         if timed and ends_phase:
             self.u = ca.vertcat(self.u, self.next_stretch)
         self.r_ref, self.rdot_ref = ca.SX.sym("r_ref", 3), ca.SX.sym("rdot_ref", 3)
         self.quaternion_ref, self.q_j_ref = ca.SX.sym("quat_ref", 4), ca.SX.sym("q_j_ref", n)
         self.q_j_frozen = ca.SX.sym("q_j_frozen", n)
         self.x_0 = ca.SX.sym("x_0", self.motion.numel())
+        self.margin = ca.SX.sym("margin")  # share of torque and voltage limits that may be used
         self.p = ca.vertcat(
             self.nominal_dt,
             self.r_ref,
@@ -84,6 +127,7 @@ class TakeOffKnot:
             self.q_j_frozen,
             ca.vec(self.foot_ref),
             self.x_0,
+            self.margin,
         )
 
     @property
@@ -96,12 +140,20 @@ class TakeOffKnot:
         middle = mean_com(self.r, self.rdot, self.dt)
         return sum((ca.cross(self.foot_ref[:, i] - middle, f) for i, f in self.force.items()), ca.SX.zeros(3))
 
+    @property
+    def R_mid(self) -> ca.SX:  # noqa: N802
+        """Attitude at mid-interval, where a step's mean rates are the rates."""
+        return rotation_matrix(quaternion_product(self.quaternion, quaternion_step(self.omega, 0.5 * self.dt)))
+
+    @property
+    def q_j_mid(self) -> ca.SX:
+        """Joint angles at mid-interval ``(n,)`` [rad]."""
+        return self.q_j + 0.5 * self.dt * self.dq_j
+
     def momentum_gap(self, model: BaseFrameModel) -> ca.SX:
-        """Return Rᵀα − α_B at mid-interval (3.8), where a step's mean rates are the rates."""
-        R_mid = rotation_matrix(quaternion_product(self.quaternion, quaternion_step(self.omega, 0.5 * self.dt)))
-        q_mid = self.q_j + 0.5 * self.dt * self.dq_j
+        """Return Rᵀα − α_B at mid-interval (3.8)."""
         alpha_mid = self.alpha + 0.5 * self.dt * self.alpha_dot
-        return R_mid.T @ alpha_mid - model.angular_momentum(q_mid, self.omega, self.dq_j)
+        return self.R_mid.T @ alpha_mid - model.angular_momentum(self.q_j_mid, self.omega, self.dq_j)
 
     def step(self, mass: float) -> ca.SX:
         """Return the next state: (3.5) and (3.6); momentum is exact for forces that are constant over the interval."""
@@ -115,7 +167,7 @@ class TakeOffKnot:
             self.alpha + self.alpha_dot * self.dt,
             quaternion_product(self.quaternion, quaternion_step(self.omega, self.dt)),
             self.q_j + self.dq_j * self.dt,
-            self.dq_j,
+            self.dq_next,
             self.next_stretch,
         )
 
@@ -159,6 +211,12 @@ def mean_com(r: ca.SX, rdot: ca.SX, dt: ca.SX) -> ca.SX:
     return r + 0.5 * dt * rdot - ca.vertcat(0, 0, GRAVITY * dt**2 / 6)
 
 
+def holding_joints(model: BaseFrameModel, held: Sequence[bool]) -> np.ndarray:
+    """Return the joints ``(n,)`` bool that move a held contact point."""
+    J = np.array(ca.DM(model.foot_jacobians.sparsity_out(0), 1)) != 0  # (3 n_c, n)
+    return J[np.repeat(np.asarray(held, dtype=bool), 3)].any(axis=0)
+
+
 def world_feet(model: BaseFrameModel, s: TakeOffKnot) -> ca.SX:
     """Return c_i ``(3, n_c)`` [m] in S from the centre of mass and the attitude (3.7)."""
     relative = model.feet(s.q_j) - ca.repmat(model.com(s.q_j), 1, s.foot_ref.shape[1])
@@ -175,11 +233,11 @@ def link_slopes(robot: Robot, model: BaseFrameModel, q_j: ca.SX, R: ca.SX) -> tu
 
 
 def foot_velocities(model: BaseFrameModel, s: TakeOffKnot) -> list[ca.SX]:
-    """Return each ċ_i ``(3,)`` in B [m/s] at the rates of the ground."""
+    """Return each ċ_i ``(3,)`` in B [m/s] at the rates at which the contacts end."""
     feet, com, J = model.feet(s.q_j), model.com(s.q_j), model.foot_jacobians(s.q_j)
     J_com = ca.jacobian(com, s.q_j)
     rates = []
     for i in range(s.foot_ref.shape[1]):
         relative = feet[:, i] - com
-        rates.append(s.R.T @ s.rdot + ca.cross(s.omega_ground, relative) + (J[3 * i : 3 * i + 3, :] - J_com) @ s.dq_j)
+        rates.append(s.R.T @ s.rdot + ca.cross(s.omega_ground, relative) + (J[3 * i : 3 * i + 3, :] - J_com) @ s.dq_before)
     return rates

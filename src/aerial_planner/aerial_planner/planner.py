@@ -36,6 +36,7 @@ from aerial_planner.transcription import Solution, SolverOptions
 
 _ITERATIONS_MAX = 50  # of one solve: those that succeed take 10 to 40
 _ITERATIONS_OF_REQUEST = 70  # after which no further flight is tried, so that a refusal takes no longer than a plan
+_TIGHTENING = 0.98  # by which the optimizer's limits are lowered further than exact torques were beyond them
 _TOUCH_RISE = 0.02  # [m] by which to fly higher when a link would touch the terrain
 _CLEARANCE_SPARE = 0.01  # [m] added to a miss, since the pose at the edge changes with the flight
 
@@ -192,17 +193,22 @@ class Planner:
         stage = self._stage(request)
         motion = load_motion(request.motion)
         q_start = self._start_configuration(start)
-        least_rise, take_off = 0.0, None
+        least_rise, margin, take_off = 0.0, self.settings.margin, None
         while True:
             schedule = self._schedule(request, motion, least_rise)
             reference = body_reference(schedule, q_start, self.robot, self._model, self._ik, self.settings)
             screen(request, schedule, reference, self.robot)
             if take_off is None:
                 take_off, solution = self._take_off(request, stage, schedule, reference, progress, clock)
-            else:  # the lower flight is near
-                take_off, solution = self._optimize(stage, schedule, reference, take_off, progress, clock)
+            else:  # the plan that was not good enough is near
+                take_off, solution = self._optimize(
+                    stage, schedule, reference, take_off, progress, clock, margin=margin
+                )
             plan = assemble(request, self.robot, self._model, schedule, reference, take_off)
             use = actuator_use(plan, self.robot)
+            if self._may_tighten(stage, solution, use, clock):
+                margin *= _TIGHTENING * self.actuator_tolerance / use.worst
+                continue
             check(plan, schedule, solution, use, self.robot, self.actuator_tolerance)
             missing, reason = self._missing_height(plan)
             if missing == 0.0:
@@ -214,6 +220,15 @@ class Planner:
             if clock.iterations > _ITERATIONS_OF_REQUEST:
                 raise RefusalError(RefusalCode.CHECK_FAILED, f"platform edge: {reason}, also on a higher flight")
             least_rise = float(plan.com[:, 2].max()) - plan.landing_com_height + missing + _CLEARANCE_SPARE
+
+    def _may_tighten(self, stage: KinoDynamic, solution: Solution, use: ActuatorUse, clock: _Clock) -> bool:
+        """Return whether exact torques are beyond the limits although the optimizer's are not, and there is time."""
+        return (
+            use.worst > self.actuator_tolerance
+            and stage.variant is not Variant.KD
+            and solution.max_violation <= VIOLATION_TOLERANCE
+            and clock.iterations <= _ITERATIONS_OF_REQUEST
+        )
 
     def _missing_height(self, plan: Plan) -> tuple[float, str]:
         """Return by how much a plan should fly higher over the terrain [m], and why; 0 if feet and links clear it.
@@ -280,9 +295,10 @@ class Planner:
         clock: _Clock,
         *,
         near: bool = False,
+        margin: float | None = None,
     ) -> tuple[TakeOffTrajectory, Solution]:
         began = time.perf_counter()
-        take_off, solution = stage.solve(schedule, reference, guess, near=near)
+        take_off, solution = stage.solve(schedule, reference, guess, near=near, margin=margin)
         clock.solve += time.perf_counter() - began
         clock.iterations += solution.iterations
         progress("kino_dynamic", clock.iterations, solution.max_violation)

@@ -161,10 +161,13 @@ class SingleRigidBody(Formulation):
         key = ("flight",)
         if key not in self._kinds:
             alpha, quaternion = ca.SX.sym("alpha", 3), ca.SX.sym("quat", 4)
-            T, share = ca.SX.sym("T"), ca.SX.sym("share")
+            T, share, quaternion_ref = ca.SX.sym("T"), ca.SX.sym("share"), ca.SX.sym("quat_ref", 4)
             x = ca.vertcat(alpha, quaternion, T)
             following = _flight_step(alpha, quaternion, T, share, self.inertia_inverse)
-            self._kinds[key] = Rows().stage("body_flight", x, ca.SX(0, 1), share, ca.SX(0), following)
+            turn = attitude_error(quaternion, quaternion_ref)
+            cost = self.settings.weights.orientation * ca.sumsqr(turn)
+            p = ca.vertcat(share, quaternion_ref)
+            self._kinds[key] = Rows().stage("body_flight", x, ca.SX(0, 1), p, cost, following)
         return self._kinds[key]
 
     def _touchdown_kind(self) -> StageKind:
@@ -200,9 +203,9 @@ class SingleRigidBody(Formulation):
         p = [share, T, reference.landing_com, foot_ref]
         stages.append(StageData.free(p=np.concatenate(p), x=x[-1], u=T, u_min=shortest, u_max=longest))
         for k in range(1, schedule.flight_knots + 1):
-            last = k == schedule.flight_knots
-            x_k = np.concatenate([reference.angular_momentum[-1], reference.flight_orientation[k], T])
-            stages.append(StageData.free(p=schedule.landing_orientation if last else share, x=x_k))
+            turned = reference.flight_orientation[k]
+            p = schedule.landing_orientation if k == schedule.flight_knots else np.append(share, turned)
+            stages.append(StageData.free(p=p, x=np.concatenate([reference.angular_momentum[-1], turned, T])))
         return stages
 
     def _trajectory(self, schedule: Schedule, reference: Reference, solution: Solution) -> TakeOffTrajectory:

@@ -17,7 +17,7 @@ import numpy as np
 from aerial_model import rotation
 from aerial_model.robot import Robot
 from aerial_planner.kino_dynamic import Variant
-from aerial_planner.knots import joint_inertia, link_slopes, mean_com
+from aerial_planner.knots import LegInertia, holding_joints, link_slopes, mean_com
 from aerial_planner.reference import Reference
 from aerial_planner.schedule import GRAVITY, Schedule
 from aerial_planner.settings import PlannerSettings
@@ -89,8 +89,10 @@ class LiteralProblem:
         self.flight_quaternion, self.flight_q_j = variable(4, self.M + 1), variable(n, self.M + 1)
         self.flight_omega, self.flight_time = variable(3, self.M), variable()
         self.R = [rotation_matrix(self.quaternion[:, k]) for k in range(K)]
-        before = ca.horzcat(ca.MX.zeros(n, 1), self.dq_j[:, :-1])
-        self.ddq_j = (self.dq_j - before) / self.schedule.dt
+        gained = self.dq_j[:, :-1] - ca.horzcat(ca.MX.zeros(n, 1), self.dq_j[:, :-2])
+        gained[:, -1] = self.dq_j[:, -1] - ca.sum2(self.dq_j[:, -3:-1]) / 2  # the rates at which the contacts end
+        self.ddq_j = gained / self.schedule.dt  # on each interval
+        self.ddq_j_end = (self.dq_j[:, -1] - self.dq_j[:, -2]) / (0.5 * self.schedule.dt)
 
     def _objective(self) -> None:
         w, ref, cost = self.settings.weights, self.reference, ca.MX(0)
@@ -102,7 +104,10 @@ class LiteralProblem:
             cost += w.angular_velocity * ca.sumsqr(self.omega[:, k])
             cost += w.force * ca.sumsqr(self.f[:, k])
         cost += w.joint_velocity * ca.sumsqr(self.dq_j) + w.joint_acceleration * ca.sumsqr(self.ddq_j)
-        cost += w.angular_velocity * ca.sumsqr(self.flight_omega)
+        cost += w.joint_acceleration * ca.sumsqr(self.ddq_j_end) + w.angular_velocity * ca.sumsqr(self.flight_omega)
+        for k in range(1, self.M):
+            turn = attitude_error(self.flight_quaternion[:, k], ca.DM(ref.flight_orientation[k]))
+            cost += w.orientation * ca.sumsqr(turn)
         cost += w.flight_time * (self.flight_time - self.schedule.flight_time) ** 2
         self.cost = cost
         self.opti.minimize(cost)
@@ -133,11 +138,16 @@ class LiteralProblem:
             feet = ca.repmat(self.base[:, k], 1, self.robot.n_contacts) + R @ self.model.feet(q_j)
             self.opti.subject_to(self.c[:, k] == ca.vec(feet))
             omega, dq_j, alpha = self.omega[:, k], self.dq_j[:, k], self.alpha[:, k]
-            if k < self.N:  # at mid-interval, where a step's mean rates are the rates
-                half = 0.5 * self.schedule.dt
-                R = rotation_matrix(quaternion_product(self.quaternion[:, k], quaternion_step(omega, half)))
-                q_j, alpha = q_j + half * dq_j, alpha + half * self.alpha_dot[:, k]
+            if k < self.N:
+                R, q_j = self._middle(k)
+                alpha = alpha + 0.5 * self.schedule.dt * self.alpha_dot[:, k]
             self.opti.subject_to(alpha == R @ self.model.angular_momentum(q_j, omega, dq_j))  # (3.8)
+
+    def _middle(self, k: int) -> tuple[ca.MX, ca.MX]:
+        """Return attitude and joint angles at mid-interval, where a step's mean rates are the rates."""
+        half = 0.5 * self.schedule.dt
+        turned = quaternion_product(self.quaternion[:, k], quaternion_step(self.omega[:, k], half))
+        return rotation_matrix(turned), self.q_j[:, k] + half * self.dq_j[:, k]
 
     def _contacts(self) -> None:
         mu, subject_to = self.robot.friction_coefficient, self.opti.subject_to
@@ -167,6 +177,7 @@ class LiteralProblem:
         self._feet_leave_the_ground_at_rest()
 
     def _feet_leave_the_ground_at_rest(self) -> None:
+        """Joints that hold a contact point keep it at rest up to the end; the others go on as before."""
         q_j, k = ca.MX.sym("q_j", self.robot.n_joints), self.N
         J_com = ca.Function("J_com", [q_j], [ca.jacobian(self.model.com(q_j), q_j)])(self.q_j[:, k])
         J, feet, com = (g(self.q_j[:, k]) for g in (self.model.foot_jacobians, self.model.feet, self.model.com))
@@ -174,11 +185,14 @@ class LiteralProblem:
             rates = (J[3 * i : 3 * i + 3, :] - J_com) @ self.dq_j[:, k]
             turning = ca.cross(self.omega[:, k], feet[:, i] - com)
             self.opti.subject_to(self.R[k].T @ self.rdot[:, k] + turning + rates == 0)
+        for joint in np.flatnonzero(~holding_joints(self.model, self.schedule.contact[-1])):
+            going_on = 1.5 * self.dq_j[joint, k - 1] - 0.5 * self.dq_j[joint, k - 2]
+            self.opti.subject_to(self.dq_j[joint, k] == going_on)
 
     def _limits(self) -> None:
         robot, settings, law = self.robot, self.settings, self.robot.actuators
         low, high = robot.planning_range
-        inertia = ca.DM(joint_inertia(robot))
+        inertia = LegInertia.of(robot)
         frozen = ca.DM(robot.frozen_joints.astype(float))
         start = self.reference.x_0[-robot.n_joints :]
         for k in range(self.N + 1):
@@ -188,13 +202,14 @@ class LiteralProblem:
                 continue
             speed = settings.speed_margin * law.no_load_speed
             self.opti.subject_to(self.opti.bounded(-speed, self.dq_j[:, k], speed))  # (3.11a)
-            q_j = self.q_j[:, k]
+            if k == self.N:
+                continue
+            R, q_j = self._middle(k)
             if self.variant is Variant.AAKD_STAR:
                 q_j = frozen * start + (1 - frozen) * q_j
-            torque = inertia @ self.ddq_j[:, k]
-            if k < self.N:
-                forces = ca.reshape(self.f[:, k], 3, -1)
-                torque -= self.model.foot_jacobians(q_j).T @ ca.vec(self.R[k].T @ forces)  # (3.14)
+            force_B = R.T @ ca.reshape(self.f[:, k], 3, -1)
+            torque = inertia.torque(self.ddq_j[:, k], force_B, self.model.feet(q_j))
+            torque -= self.model.foot_jacobians(q_j).T @ ca.vec(force_B)  # (3.14)
             share = settings.margin
             volts = ca.DM(law.volts_per_torque) * torque + ca.DM(law.volts_per_speed) * self.dq_j[:, k]
             self.opti.subject_to(self.opti.bounded(-share, torque / law.torque_max, share))  # (3.11b)
