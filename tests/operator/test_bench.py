@@ -8,7 +8,7 @@ import pytest
 @pytest.fixture(scope="module")
 def benched(aerial_process, tmp_path_factory):
     folder = tmp_path_factory.mktemp("bench")
-    options = ("--sections", "variants", "--motions", "jump", "--repeats", 1, "--out", folder)
+    options = ("--sections", "variants", "--motions", "jump", "--repeats", 1, "--interpreted", "--out", folder)
     return aerial_process("bench", "planner", *options, "--json"), folder
 
 

@@ -8,7 +8,6 @@ import pytest
 
 from aerial_planner.compiled import CompilationError, FunctionLibrary
 from aerial_planner.planner import Planner
-from aerial_planner.settings import PlannerSettings
 from aerial_planner.stage import Rows
 from aerial_planner.transcription import Problem, SolverOptions
 
@@ -24,14 +23,14 @@ def kind():
 
 
 @pytest.fixture
-def library(tmp_path, robot):
-    return FunctionLibrary(tmp_path, robot, PlannerSettings())
+def library(tmp_path):
+    return FunctionLibrary(tmp_path)
 
 
 def test_compiled_functions_give_the_interpreted_numbers(library, kind):
-    assert library.load("swing") is None
+    assert library.load(kind) is None
     assert library.compile(kind)
-    compiled, interpreted = library.load("swing"), kind.functions()
+    compiled, interpreted = library.load(kind), kind.functions()
     rng = np.random.default_rng(0)
     for name in ("values", "gradient", "jacobian", "hessian"):
         ours, theirs = getattr(compiled, name), getattr(interpreted, name)
@@ -45,9 +44,15 @@ def test_what_is_compiled_is_not_compiled_again(library, kind):
     assert not library.compile(kind)
 
 
-def test_other_settings_have_another_library(library, tmp_path, robot):
-    other = FunctionLibrary(tmp_path, robot, dataclasses.replace(PlannerSettings(), margin=0.5))
-    assert other.folder != library.folder
+def test_an_expression_that_has_changed_is_another(library, kind):
+    library.compile(kind)
+    assert library.load(dataclasses.replace(kind, cost=2 * kind.cost)) is None
+    assert library.load(dataclasses.replace(kind, constraints=kind.constraints + kind.p)) is None
+
+
+def test_bounds_are_no_part_of_what_is_compiled(library, kind):
+    library.compile(kind)
+    assert library.load(dataclasses.replace(kind, upper=kind.upper + 1)) is not None
 
 
 def test_a_problem_solves_with_compiled_functions_and_without(library, kind):

@@ -14,8 +14,8 @@ from aerial_model.errors import ConfigurationError
 from aerial_model.robot import Robot
 from aerial_model.terrain import HURDLE_THICKNESS, PLATFORM_LENGTH, Terrain
 
-UPPER_MARGIN = 0.08  # of the feet on the platform from its edge [m]: more than the least, for landings off the goal
-LOWER_MARGIN = 0.03  # of the feet below it from its edge [m]
+UPPER_MARGIN = 0.08  # of feet that land on a platform from its edge [m]: more than the least, for landings off the goal
+LOWER_MARGIN = 0.03  # of feet below it, or standing on it, from its edge [m]
 
 
 class ControllerCommand(StrEnum):
@@ -96,15 +96,14 @@ class MotionRequest:
     def _platform_edge(self, robot: Robot, *, down: bool) -> float:
         """Return the distance [m] of the edge to jump over.
 
-        The feet on the platform keep ``UPPER_MARGIN`` and those below it at least ``LOWER_MARGIN``; where both cannot
-        be, the edge is halfway between. Flying feet clear an edge the more easily the nearer it is to the upper feet.
+        Feet that land on the platform keep ``UPPER_MARGIN``, the others at least ``LOWER_MARGIN``; where both cannot be, the edge is halfway between. Flying feet clear an edge the more easily the nearer it is to the upper feet.
         """
         rear_standing, front_standing = self._standing_feet(robot)
         rear_landing, front_landing = self._landing_feet(robot)
         if down:
-            nearest, farthest = front_standing + UPPER_MARGIN, rear_landing - LOWER_MARGIN
+            nearest, farthest = front_standing + LOWER_MARGIN, rear_landing - LOWER_MARGIN
             edge = nearest if nearest <= farthest else (nearest + farthest) / 2
-            return min(edge, rear_standing - UPPER_MARGIN + PLATFORM_LENGTH)
+            return min(edge, rear_standing - LOWER_MARGIN + PLATFORM_LENGTH)
         nearest, farthest = front_standing + LOWER_MARGIN, rear_landing - UPPER_MARGIN
         edge = farthest if nearest <= farthest else (nearest + farthest) / 2
         return max(edge, front_landing + UPPER_MARGIN - PLATFORM_LENGTH)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from aerial_operator.console import say
 from aerial_planner.compiled import default_cache
 from aerial_planner.plan_library import PlanLibrary
 from aerial_planner.planner import Planner
+from aerial_planner.schedule import load_motion
 
 
 def add_planner_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,3 +51,22 @@ def warm_planner(args: argparse.Namespace, robot: Robot, request: MotionRequest)
     with contextlib.suppress(RefusalError):  # the plan will raise it again, with its figures
         planner.warm_up(request)
     return planner
+
+
+def compile_functions(robot: Robot, motions: Iterable[str], variants: Iterable[str]) -> int:
+    """Compile what plans of these motions and variants evaluate, both senses of turning; return how much was missing."""
+    requests = [
+        MotionRequest(motion=motion, rotation=turns, variant=variant)
+        for variant in variants
+        for motion in motions
+        for turns in _senses(motion)
+    ]
+    return Planner(robot, cache=default_cache()).compile(requests, lambda kind: say(f"compiling {kind}"))
+
+
+def _senses(motion: str) -> list[float | None]:
+    """Return what to ask of a motion so that all its contact schedules occur; None: as the motion says."""
+    wanted = load_motion(motion)
+    if wanted.rotation is None or "rotation" not in wanted.goal:
+        return [None]
+    return [wanted.rotation.turns, -wanted.rotation.turns]

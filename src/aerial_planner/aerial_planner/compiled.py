@@ -1,7 +1,7 @@
 """Stage functions compiled to machine code, on disk: three times faster to evaluate, and no derivatives to make.
 
-A library is valid for one robot, one set of weights and margins, one CasADi and one state of the formulation's source; all
-of them are in its fingerprint, and with it in the name of its folder. Where a function is not compiled, the interpreted one is
+A file's name has the hash of the expressions it was made from, so that a function is found again exactly as long as it is
+the same: whatever it depends on, robot, weights or formulation. Where a function is not compiled, the interpreted one is
 used. Compiling takes a C compiler and some seconds a stage kind, and is asked for, never done behind one's back.
 """
 
@@ -13,35 +13,17 @@ import platform
 import shutil
 import subprocess
 import tempfile
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import casadi as ca
 
 from aerial_model.errors import AerialError
+from aerial_planner import stage
 from aerial_planner.stage import StageFunctions, StageKind
-
-if TYPE_CHECKING:
-    from aerial_model.robot import Robot
-    from aerial_planner.settings import PlannerSettings
 
 _NAMES = ("values", "gradient", "jacobian", "hessian")
 # Two passes of -O1 take time with the square of a function's length and gain nothing on straight-line code.
 _FLAGS = ("-O1", "-fno-tree-dominator-opts", "-fno-tree-pre", "-fPIC", "-shared")
-_SOURCES = ("symbolic.py", "stage.py", "knots.py", "srbm.py", "kino_dynamic.py")  # what the functions are made from
-# Settings that reach the functions as parameters and the solver as bounds, with each request.
-_GIVEN = {
-    "dt",
-    "flight_knots",
-    "margin",
-    "speed_margin",
-    "force_max",
-    "force_min",
-    "swing_clearance",
-    "swing_rise_time",
-    "landing_lead",
-}
 
 
 class CompilationError(AerialError):
@@ -54,23 +36,21 @@ def default_cache() -> Path:
 
 
 class FunctionLibrary:
-    """The compiled stage kinds of one robot and one set of settings.
+    """The compiled stage kinds of all robots.
 
     Args:
-        cache: folder that holds the libraries of all robots.
-        robot: the robot.
-        settings: the planner's.
+        folder: that holds them.
     """
 
-    def __init__(self, cache: Path, robot: Robot, settings: PlannerSettings) -> None:
-        self.folder = cache / f"{robot.name}-{_fingerprint(robot, settings)}"
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
 
-    def load(self, kind: str) -> StageFunctions | None:
+    def load(self, kind: StageKind) -> StageFunctions | None:
         """Return the compiled functions of a stage kind, None if there are none."""
         file = self._file(kind)
         if not file.is_file():
             return None
-        return StageFunctions(**{name: ca.external(f"{kind}_{name}", str(file)) for name in _NAMES})
+        return StageFunctions(**{name: ca.external(f"{kind.name}_{name}", str(file)) for name in _NAMES})
 
     def compile(self, kind: StageKind) -> bool:
         """Compile a stage kind, unless it is there; return whether it had to be.
@@ -78,7 +58,7 @@ class FunctionLibrary:
         Raises:
             CompilationError: if there is no C compiler, or it fails.
         """
-        if self._file(kind.name).is_file():
+        if self._file(kind).is_file():
             return False
         compiler = shutil.which(os.environ.get("CC", "gcc"))
         if compiler is None:
@@ -94,19 +74,17 @@ class FunctionLibrary:
             outcome = subprocess.run(command, cwd=scratch, capture_output=True, text=True, check=False)
             if outcome.returncode != 0:
                 raise CompilationError(f"{compiler} failed on {kind.name}: {outcome.stderr.strip()[-300:]}")
-            os.replace(Path(scratch, "kind.so"), self._file(kind.name))  # whole or not at all
+            os.replace(Path(scratch, "kind.so"), self._file(kind))  # whole or not at all
         return True
 
-    def _file(self, kind: str) -> Path:
-        return self.folder / f"{kind}.so"
+    def _file(self, kind: StageKind) -> Path:
+        return self.folder / f"{kind.name}-{_fingerprint(kind)}.so"
 
 
-def _fingerprint(robot: Robot, settings: PlannerSettings) -> str:
-    digest = hashlib.sha256()
-    here = Path(__file__).parent
-    numbers = {name: value for name, value in asdict(settings).items() if name not in _GIVEN}
-    parts = [robot.model_hash, repr(numbers), ca.__version__, platform.machine(), " ".join(_FLAGS)]
-    digest.update("\n".join(parts).encode())
-    for source in _SOURCES:
-        digest.update((here / source).read_bytes())
+def _fingerprint(kind: StageKind) -> str:
+    """Return the hash of a kind's expressions and of how they become functions and machine code."""
+    outputs = [kind.cost, kind.constraints, *([] if kind.next_state is None else [kind.next_state])]
+    content = ca.Function(kind.name, [kind.x, kind.u, kind.p], outputs).serialize()
+    digest = hashlib.sha256("\n".join([content, ca.__version__, platform.machine(), *_FLAGS]).encode())
+    digest.update(Path(stage.__file__).read_bytes())
     return digest.hexdigest()[:16]

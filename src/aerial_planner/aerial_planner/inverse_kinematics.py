@@ -11,6 +11,7 @@ from aerial_planner.symbolic import BaseFrameModel
 _ITERATIONS = 12
 _DAMPING = 1e-4  # [m²/rad²]
 _STEP_MAX = 0.5  # [rad] per iteration
+_STEP_MIN = 1e-5  # [rad] that is not worth another: the next would be its square
 
 
 class InverseKinematics:
@@ -39,7 +40,7 @@ class InverseKinematics:
             J = np.asarray(J).T.reshape(len(q), n, n_rows)  # transposed blocks, Jᵀ of each
             normal = J @ J.transpose(0, 2, 1) + _DAMPING * np.eye(n)
             step = np.linalg.solve(normal, (J @ error[..., None]))[..., 0]
-            q = np.clip(q + np.clip(step, -_STEP_MAX, _STEP_MAX), *self._range)
-            if np.max(np.abs(error)) < 1e-6:
+            before, q = q, np.clip(q + np.clip(step, -_STEP_MAX, _STEP_MAX), *self._range)
+            if np.max(np.abs(q - before)) < _STEP_MIN:
                 break
         return q

@@ -119,7 +119,12 @@ class KinoDynamic(Formulation):
     # --- stage kinds: variables, objective, dynamics, constraints ---------------------------------------------------
 
     def _take_off_kind(
-        self, touching: tuple[bool, ...] | None, loaded: tuple[bool, ...], *, ends_phase: bool = False, last: bool = False
+        self,
+        touching: tuple[bool, ...] | None,
+        loaded: tuple[bool, ...],
+        *,
+        ends_phase: bool = False,
+        last: bool = False,
     ) -> StageKind:
         """Return the knot whose ``touching`` contacts are held and ``loaded`` ones push; touching None: the first knot."""
         ends_phase = ends_phase and self.timed  # else it makes no difference
@@ -291,7 +296,14 @@ class KinoDynamic(Formulation):
             loaded = schedule.contact[k]
             n_f = int(loaded.sum())
             p = [[schedule.dt], reference.com[k], reference.com_velocity[k], reference.orientation[k]]
-            p += [reference.joint_position[k], reference.x_0[-n:], ground[k].ravel(), reference.x_0, np.zeros(n), [margin]]
+            p += [
+                reference.joint_position[k],
+                reference.x_0[-n:],
+                ground[k].ravel(),
+                reference.x_0,
+                np.zeros(n),
+                [margin],
+            ]
             u = [guess.angular_velocity[k], guess.joint_velocity[k], guess.force[k][loaded].ravel()]
             force_min = np.tile([-np.inf, -np.inf, settings.force_min], n_f)
             force_max = np.tile([np.inf, np.inf, settings.force_max], n_f)

@@ -47,9 +47,7 @@ class LegInertia:
             force_B: of the contacts ``(3, n_c)`` in B [N].
             feet_B: contact points ``(3, n_c)`` in B [m].
         """
-        moment = sum(
-            (ca.cross(feet_B[:, i], force_B[:, i]) for i in range(force_B.shape[1])), type(force_B).zeros(3)
-        )
+        moment = sum((ca.cross(feet_B[:, i], force_B[:, i]) for i in range(force_B.shape[1])), type(force_B).zeros(3))
         return ca.DM(self.joint) @ ddq_j + ca.DM(self.wrench_share) @ ca.vertcat(ca.sum2(force_B), moment)
 
 
@@ -239,5 +237,7 @@ def foot_velocities(model: BaseFrameModel, s: TakeOffKnot) -> list[ca.SX]:
     rates = []
     for i in range(s.foot_ref.shape[1]):
         relative = feet[:, i] - com
-        rates.append(s.R.T @ s.rdot + ca.cross(s.omega_ground, relative) + (J[3 * i : 3 * i + 3, :] - J_com) @ s.dq_before)
+        rates.append(
+            s.R.T @ s.rdot + ca.cross(s.omega_ground, relative) + (J[3 * i : 3 * i + 3, :] - J_com) @ s.dq_before
+        )
     return rates

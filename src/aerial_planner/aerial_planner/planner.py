@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
@@ -35,7 +34,7 @@ from aerial_planner.trajectory import TakeOffTrajectory
 from aerial_planner.transcription import Solution, SolverOptions
 
 _ITERATIONS_MAX = 50  # of one solve: those that succeed take 10 to 40
-_ITERATIONS_OF_REQUEST = 70  # after which no further flight is tried, so that a refusal takes no longer than a plan
+_ITERATIONS_OF_REQUEST = 100  # after which nothing else is tried, so that a refusal takes no longer than a plan
 _TIGHTENING = 0.98  # by which the optimizer's limits are lowered further than exact torques were beyond them
 _TOUCH_RISE = 0.02  # [m] by which to fly higher when a link would touch the terrain
 _CLEARANCE_SPARE = 0.01  # [m] added to a miss, since the pose at the edge changes with the flight
@@ -123,14 +122,11 @@ class Planner:
         self.actuator_tolerance = actuator_tolerance
         self.plans = plans
         self.settings = settings or robot.section("planner", PlannerSettings)
-        self._library = FunctionLibrary(cache, robot, self.settings) if cache else None
+        self._library = FunctionLibrary(cache) if cache else None
         self.options = SolverOptions(solver=solver, max_iterations=_ITERATIONS_MAX)
         self._model = base_frame_model(robot)
         self._ik = InverseKinematics(robot, self._model)
-        near = dataclasses.replace(
-            self.options, initial_barrier=0.01, bound_distance=0.1
-        )  # the body knows fewer limits
-        self._srbm = SingleRigidBody(robot, self._model, self._ik, self.settings, near, self._library)
+        self._srbm = SingleRigidBody(robot, self._model, self._ik, self.settings, self.options, self._library)
         self._collisions = CollisionModel(robot)
         self._kino_dynamic: dict[tuple[Variant, bool], KinoDynamic] = {}
 
@@ -157,7 +153,7 @@ class Planner:
     def warm_up(self, request: MotionRequest) -> None:
         """Build the problems of a request's schedule, so that its first plan is as fast as later ones."""
         schedule = self._schedule(request, load_motion(request.motion))
-        self._srbm.problem(schedule)
+        self._srbm.problem(schedule, near=True)
         self._stage(request).problem(schedule)
         if self.plans is not None:
             self._stage(request).problem(schedule, near=True)
@@ -182,7 +178,7 @@ class Planner:
                 kinds.update((kind.name, kind) for kind in stage.kinds(schedule))
         compiled = 0
         for name, kind in kinds.items():
-            if self._library.load(name) is None:
+            if self._library.load(kind) is None:
                 progress(name)
                 compiled += self._library.compile(kind)
         return compiled

@@ -6,6 +6,7 @@ A motion is data: one YAML file in ``motions/``; no motion has code of its own.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -125,7 +126,12 @@ def load_motion(name: str) -> Motion:
         raise RefusalError(
             RefusalCode.UNKNOWN_MOTION, f"unknown motion '{name}'{closest(name, known)}; known: {', '.join(known)}"
         )
-    return from_mapping(Motion, load_yaml(known[name]), str(known[name]))
+    return _read_motion(known[name], known[name].stat().st_mtime_ns)
+
+
+@lru_cache
+def _read_motion(file: Path, changed: int) -> Motion:
+    return from_mapping(Motion, load_yaml(file), str(file))
 
 
 def flight_time(rise: float, height: float) -> float:

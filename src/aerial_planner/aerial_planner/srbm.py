@@ -9,6 +9,8 @@ reaches no farther than (3.18) allows. Joint trajectories then come from inverse
 
 from __future__ import annotations
 
+import dataclasses
+
 import casadi as ca
 import numpy as np
 
@@ -56,8 +58,15 @@ class SingleRigidBody(Formulation):
         self.attachment, self.leg_length = _legs(robot, model)  # (n_c, 3) from the centre of mass in B; (n_c,) [m]
 
     def solve(self, schedule: Schedule, reference: Reference) -> tuple[TakeOffTrajectory, Solution]:
-        """Return the optimum near the reference, with joint trajectories, and the solver's account of it."""
-        solution = self.problem(schedule).solve(self._stages(schedule, reference))
+        """Return the optimum near the reference, with joint trajectories, and the solver's account of it.
+
+        The reference is within the few limits of a single rigid body, so the first try starts at a small barrier.
+        """
+        stages = self._stages(schedule, reference)
+        solution = self.problem(schedule, near=True).solve(stages)
+        if not solution.converged:
+            second = self.problem(schedule).solve(stages)
+            solution = dataclasses.replace(second, iterations=solution.iterations + second.iterations)
         return self._trajectory(schedule, reference, solution), solution
 
     def reference_trajectory(self, schedule: Schedule, reference: Reference) -> TakeOffTrajectory:

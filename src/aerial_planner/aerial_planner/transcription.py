@@ -99,7 +99,7 @@ class Problem:
         return self._layout.functions(self.options.solver, self._functions_of)
 
     def _functions_of(self, kind: StageKind) -> StageFunctions:
-        compiled = self._library.load(kind.name) if self._library else None
+        compiled = self._library.load(kind) if self._library else None
         return compiled or kind.functions()
 
     def _build(self) -> ca.Function:

@@ -25,7 +25,8 @@ def knots(subject: Subject) -> list[Row]:
         usual = contact_schedule(request, load_motion(motion), subject.robot, settings.dt, settings.flight_knots)
         for wanted in KNOTS:
             dt = usual.take_off_time / wanted
-            planner = Planner(subject.robot, settings=dataclasses.replace(settings, dt=dt), actuator_tolerance=np.inf)
+            finer = dataclasses.replace(settings, dt=dt)
+            planner = Planner(subject.robot, settings=finer, cache=subject.cache, actuator_tolerance=np.inf)
             subject.progress(f"knots: {motion} with {wanted}")
             row = {"motion": motion, "knots": wanted, "dt_s": dt, "flight_knots": settings.flight_knots}
             rows.append({**row, **_repeated(subject, planner, motion)})

@@ -14,7 +14,9 @@ from aerial_model.errors import ConfigurationError
 from aerial_model.robot import Robot
 from aerial_operator.bench_tables import tables
 from aerial_operator.console import Report, UsageError, say, to_json
+from aerial_operator.planning import compile_functions
 from aerial_planner.compiled import default_cache
+from aerial_planner.kino_dynamic import Variant
 
 REPEATS = 10
 GOALS = 50
@@ -32,7 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--motions", metavar="NAME[,…]", type=_names, help="(default: all it has the contacts for)")
     parser.add_argument("--repeats", metavar="N", type=int, default=REPEATS, help=f"(default: {REPEATS})")
     parser.add_argument("--goals", metavar="N", type=int, default=GOALS, help=f"of each motion (default: {GOALS})")
-    parser.add_argument("--compiled", action="store_true", help="use what `aerial compile` made, where it made it")
+    parser.add_argument(
+        "--interpreted", action="store_true", help="leave out what `aerial compile` does; else it is done first"
+    )
     parser.add_argument(
         "--with-crocoddyl", action="store_true", help="install crocoddyl for itself, if it is not there"
     )
@@ -50,7 +54,7 @@ def run(args: argparse.Namespace) -> Report:
         goals=args.goals,
         seed=args.seed,
         folder=args.out,
-        cache=default_cache() if args.compiled else None,
+        cache=None if args.interpreted else default_cache(),
         progress=say,
     )
     figures = {
@@ -58,11 +62,13 @@ def run(args: argparse.Namespace) -> Report:
         "seed": args.seed,
         "repeats": args.repeats,
         "goals": args.goals,
-        "compiled": args.compiled,
+        "compiled": not args.interpreted,
         "rows": [],
     }
     file = args.out / f"{args.what}.json"
     _write(file, to_json(figures))  # before an hour is spent on what cannot be written
+    if not args.interpreted:
+        compile_functions(robot, subject.motions, Variant)
     for row in measured(subject, sections):
         figures["rows"].append(row)
         _write(file, to_json(figures))
