@@ -146,6 +146,7 @@ _TABLES = {
             "worst torque": _beyond("take_off", "worst_torque_ratio"),
             "voltage": _beyond("take_off", "worst_voltage_ratio"),
             "flight beyond": _beyond("flight", "beyond", 2),
+            "flown": lambda row: f"{row['verified']}/{row['accepted']}",
             "reach [m, turns]": _reach,
         },
     ),

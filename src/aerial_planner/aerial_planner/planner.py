@@ -33,6 +33,7 @@ from aerial_planner.symbolic import base_frame_model
 from aerial_planner.trajectory import TakeOffTrajectory
 from aerial_planner.transcription import Solution, SolverOptions
 
+_TOLERANCE = 3e-4  # of the optimum: tighter ones cost two iterations and gain a hundred-thousandth of the cost
 _ITERATIONS_MAX = 50  # of one solve: those that succeed take 10 to 40
 _ITERATIONS_OF_REQUEST = 100  # after which nothing else is tried, so that a refusal takes no longer than a plan
 _TIGHTENING = 0.98  # by which the optimizer's limits are lowered further than exact torques were beyond them
@@ -123,7 +124,7 @@ class Planner:
         self.plans = plans
         self.settings = settings or robot.section("planner", PlannerSettings)
         self._library = FunctionLibrary(cache) if cache else None
-        self.options = SolverOptions(solver=solver, max_iterations=_ITERATIONS_MAX)
+        self.options = SolverOptions(solver=solver, tolerance=_TOLERANCE, max_iterations=_ITERATIONS_MAX)
         self._model = base_frame_model(robot)
         self._ik = InverseKinematics(robot, self._model)
         self._srbm = SingleRigidBody(robot, self._model, self._ik, self.settings, self.options, self._library)
@@ -203,7 +204,7 @@ class Planner:
             plan = assemble(request, self.robot, self._model, schedule, reference, take_off)
             use = actuator_use(plan, self.robot)
             if self._may_tighten(stage, solution, use, clock):
-                margin *= _TIGHTENING * self.actuator_tolerance / use.worst
+                margin *= _TIGHTENING * ACTUATOR_TOLERANCE / use.worst
                 continue
             check(plan, schedule, solution, use, self.robot, self.actuator_tolerance)
             missing, reason = self._missing_height(plan)
@@ -220,7 +221,7 @@ class Planner:
     def _may_tighten(self, stage: KinoDynamic, solution: Solution, use: ActuatorUse, clock: _Clock) -> bool:
         """Return whether exact torques are beyond the limits although the optimizer's are not, and there is time."""
         return (
-            use.worst > self.actuator_tolerance
+            use.worst > ACTUATOR_TOLERANCE
             and stage.variant is not Variant.KD
             and solution.max_violation <= VIOLATION_TOLERANCE
             and clock.iterations <= _ITERATIONS_OF_REQUEST

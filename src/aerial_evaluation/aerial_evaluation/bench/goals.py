@@ -2,7 +2,8 @@
 
 A motion's goals are measured from its usual landing place along a few axes: ahead, to the left, turns about the
 vertical, the height of a platform. The reach along each, to either side, is found by bisection with the planner's own
-verdict; goals are then spread evenly over the part of the ellipsoid through these ends that ``SHARE`` of it spans.
+verdict; goals are then spread evenly over the part of the ellipsoid through these ends that ``SHARE`` of it spans. What is
+handed out is flown by MuJoCo.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
+from aerial_evaluation.bench.flown import flown
 from aerial_evaluation.bench.samples import Row, Sample, measure, summary
 from aerial_evaluation.bench.subject import Subject
 from aerial_evaluation.bench.violations import violations
@@ -63,11 +65,12 @@ def goals(subject: Subject) -> list[Row]:
                     "variant": variant.value,
                     **summary(samples),
                     **violations(samples),
+                    **flown(subject.robot, samples),
                 }
             )
     for variant, samples in everything.items():
         row = {"family": "all", "reach": None, "variant": variant.value}
-        rows.append({**row, **summary(samples), **violations(samples)})
+        rows.append({**row, **summary(samples), **violations(samples), **flown(subject.robot, samples)})
     return rows
 
 
