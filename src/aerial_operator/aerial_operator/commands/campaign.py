@@ -26,6 +26,7 @@ _PASSED_ON = {  # what a trial alone must be told, and what it takes to be so
     "rotation": None,
     "platform": None,
     "hurdle": None,
+    "gap": None,
     "edge": None,
     "variant": "AAKD*",
     "solver": "fatrop",
