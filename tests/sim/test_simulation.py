@@ -9,6 +9,7 @@ from aerial_model.kinematics import Kinematics
 from aerial_model.robot import BASE_ORIENTATION, JOINT_POSITION
 from aerial_model.state import Measurement
 from aerial_model.terrain import Box, Terrain
+from aerial_sim.conditions import Conditions
 from aerial_sim.simulation import Simulation
 
 GRAVITY = 9.81  # [m/s²]
@@ -239,4 +240,4 @@ def test_an_unknown_noise_is_refused(robot):
 
 def test_periods_that_do_not_fit_are_refused(robot):
     with pytest.raises(ConfigurationError, match="multiple"):
-        Simulation(robot, physics_dt=0.0007)
+        Simulation(robot, conditions=Conditions(physics_step=0.0007))

@@ -33,7 +33,6 @@ from aerial_sim.ground_truth import GroundTruth
 from aerial_sim.sensors import SensorNoise, Sensors
 from aerial_sim.world import XYZW, World, build
 
-PHYSICS_DT = 0.0005  # [s]
 CONTROL_DT = 0.002  # [s]
 FLAT = Terrain()
 AS_EXPECTED = Conditions()
@@ -48,9 +47,8 @@ class Simulation:
         terrain: expressed in W.
         noise: ``"nominal"`` or ``"off"``; ``"off"`` also starts exactly in the home pose, heading along x.
         seed: of noise, biases, starting joint offsets and heading.
-        physics_dt: MuJoCo's step [s].
-        control_dt: period of commands and measurements [s], a multiple of ``physics_dt``.
-        conditions: of battery, drives, robot and ground, from the start on.
+        control_dt: period of commands and measurements, a multiple of the physics step [s].
+        conditions: of battery, drives, robot and ground, from the start on, and MuJoCo's step.
 
     Raises:
         ConfigurationError: for an unknown noise, periods that do not fit, or a URDF that MuJoCo cannot use.
@@ -63,10 +61,10 @@ class Simulation:
         terrain: Terrain = FLAT,
         noise: str = "nominal",
         seed: int = 0,
-        physics_dt: float = PHYSICS_DT,
         control_dt: float = CONTROL_DT,
         conditions: Conditions = AS_EXPECTED,
     ) -> None:
+        physics_dt = conditions.physics_step
         steps = round(control_dt / physics_dt)
         if steps < 1 or not np.isclose(steps * physics_dt, control_dt, rtol=1e-9, atol=0.0):
             raise ConfigurationError(f"control period {control_dt} s is no multiple of the physics step {physics_dt} s")
