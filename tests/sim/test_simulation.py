@@ -162,6 +162,27 @@ def test_equal_seeds_and_commands_agree_to_the_last_bit(robot, hold, noise):
     assert all(fields_equal(first.step(hold), second.step(hold)) for _ in range(300))
 
 
+ALL_OPTIONS = {"encoder_counts": 16384, "gear_backlash": 0.005, "localization_rate": 100, "localization_noise": 0.01}
+
+
+def test_optional_sensors_are_repeatable_to_the_last_bit(robot, hold):
+    equipped = robot.with_section("sensors", **ALL_OPTIONS)
+    runs = []
+    for _ in range(2):
+        simulation = Simulation(equipped, seed=4)
+        runs.append([simulation.measure(), *(simulation.step(hold) for _ in range(20))])
+    assert all(fields_equal(one, other) for one, other in zip(*runs, strict=True))
+    assert [reading.localization is not None for reading in runs[0]] == [k % 5 == 0 for k in range(21)]
+
+
+def test_localization_counts_from_where_the_robot_started(robot, hold):
+    equipped = robot.with_section("sensors", localization_rate=500, localization_noise=0.0)
+    simulation = Simulation(equipped, terrain=PLATFORM, seed=1)
+    q, _ = simulation.state()
+    origin, _ = robot.start_frame(q)
+    np.testing.assert_allclose(simulation.measure().localization, q[:3] - origin, atol=1e-12)
+
+
 def test_reset_forgets_everything(robot, hold, torque_command):
     fresh, used = Simulation(robot, seed=7), Simulation(robot, seed=6)
     used.disturb([30.0, 0.0, 0.0], 10.0, added_mass=2.0, friction_coefficient=0.1)

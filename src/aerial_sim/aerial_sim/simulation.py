@@ -88,7 +88,7 @@ class Simulation:
         Disturbances end; the terrain stays.
         """
         random = np.random.default_rng(seed)
-        self._sensors = Sensors(self._noise, self.robot.n_joints, random)
+        self._sensors = Sensors(self._noise, self.robot.actuators, random)
         q = self.robot.standing_configuration()
         q[JOINT_POSITION] += random.uniform(-self._start_offset, self._start_offset, self.robot.n_joints)
         turn = rotation.about_z(random.uniform(-self._start_heading, self._start_heading))
@@ -97,6 +97,7 @@ class Simulation:
         points = self.robot.contact_positions(q)
         radii = np.array([point.radius for point in self.robot.contact_points])
         q[2] += np.max(self.terrain.height(points) - (points[:, 2] - radii))
+        self._origin, _ = self.robot.start_frame(q)  # of what an outside source reports: as of an estimator begun here
         mujoco.mj_resetData(self._world.model, self._data)
         conditions = self._conditions
         added_mass = (conditions.mass - 1.0) * self.robot.mass
@@ -249,10 +250,11 @@ class Simulation:
             orientation=self._sensors.orientation(q[BASE_ORIENTATION]),
             angular_velocity=self._sensors.angular_velocity(v[BASE_ANGULAR]),
             linear_acceleration=self._sensors.linear_acceleration(self._R_WB().T @ specific_force),
-            joint_position=self._sensors.joint_position(q[JOINT_POSITION]),
+            joint_position=self._sensors.joint_position(q[JOINT_POSITION], self._drive.delivered_torque),
             joint_velocity=self._sensors.joint_velocity(v[JOINT_VELOCITY]),
             joint_torque=self._drive.delivered_torque,
             sequence=self._ticks,
+            localization=self._sensors.localization(self.time, q[BASE_POSITION] - self._origin),
         )
 
     def _R_WB(self) -> np.ndarray:  # noqa: N802
