@@ -239,6 +239,13 @@ def test_added_mass_weighs_and_survives_new_terrain(robot, hold):
     assert truth.force[:, 2].sum() == pytest.approx((robot.mass + 1.0) * GRAVITY, abs=0.01)
 
 
+def test_a_trunk_without_mass_is_refused_and_nothing_changes(robot, hold):
+    simulation = Simulation(robot, noise="off")
+    with pytest.raises(ConfigurationError, match="leave nothing of the trunk"):
+        simulation.disturb(added_mass=-10.0, friction_coefficient=0.0)
+    assert advance(simulation, hold, STAND_TIME).force[:, 2].sum() == pytest.approx(robot.mass * GRAVITY, rel=0.01)
+
+
 def test_on_ice_feet_slide(robot, hold):
     simulation = Simulation(robot, noise="off")
     advance(simulation, hold, STAND_TIME)

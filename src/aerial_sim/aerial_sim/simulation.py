@@ -191,7 +191,14 @@ class Simulation:
             added_mass: fixed to the trunk's centre of mass from now on, replacing what was added before [kg].
             friction_coefficient: of the ground from now on.
             ground_rise: of floor and boxes over where the terrain has them, from now on [m].
+
+        Raises:
+            ConfigurationError: if the trunk would have no mass left; nothing changes then.
         """
+        if added_mass is not None and self._trunk_mass + added_mass <= 0:
+            raise ConfigurationError(
+                f"added mass: {added_mass:.2f} kg would leave nothing of the trunk's {self._trunk_mass:.2f} kg"
+            )
         if force is not None:
             self._data.xfrc_applied[self._world.trunk, :3] = force
             self._push_until = self.time + duration
