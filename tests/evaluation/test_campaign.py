@@ -66,6 +66,7 @@ def test_shares_and_intervals_by_condition():
     figures = summary(done, [Variation(name="friction", low=0.5, high=0.7, steps=2)])
     assert (figures["trials"], figures["landed"], figures["success_rate"]) == (20, 18, 0.9)
     assert [(row["friction"], row["landed"]) for row in figures["conditions"]] == [(0.5, 8), (0.7, 10)]
+    assert [row["figures"]["tilt_deg"]["max"] for row in figures["conditions"]] == [8.0, 10.0]
     np.testing.assert_allclose(figures["conditions"][0]["interval95"], [0.4902, 0.9433], atol=1e-4)  # Wilson, by hand
     assert figures["failures"] == [
         {"seed": seed, "reason": "upright", "conditions": {"friction": 0.5}} for seed in (8, 9)

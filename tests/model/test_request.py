@@ -82,6 +82,36 @@ def test_a_hurdle_without_positive_height_is_refused(height):
         towards(0.0, 0.6, 0.0).with_hurdle(ROBOT, height)
 
 
+@given(direction=angles, distance=st.floats(0.7, 1.2), width=st.floats(0.05, 0.15))
+def test_no_foot_stands_or_lands_in_a_gap_that_fits(direction, distance, width):
+    terrain = towards(direction, distance, 0.0).with_gap(ROBOT, width).terrain
+    feet = np.vstack([STANDING, landing_feet(towards(direction, distance, 0.0))])
+    np.testing.assert_allclose(terrain.height(feet), 0.0, atol=TOLERANCE)
+
+
+def test_a_gap_too_wide_leaves_room_for_the_standing_feet():
+    near = towards(0.0, 0.6, 0.0).with_gap(ROBOT, 0.9).terrain.boxes[0]
+    assert np.all(near.covers(STANDING, margin=-UPPER_MARGIN + TOLERANCE))
+
+
+def test_a_given_edge_is_where_the_gap_begins_and_the_far_bank_is_as_high_as_the_goal():
+    near, far = towards(0.0, 0.9, 0.1).with_gap(ROBOT, 0.2, edge=0.3).terrain.boxes
+    assert near.centre[0] + near.size[0] / 2 == pytest.approx(0.3)
+    assert far.centre[0] - far.size[0] / 2 == pytest.approx(0.5)
+    assert far.top == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("width", [0.0, -0.1, np.nan, np.inf])
+def test_a_gap_without_positive_width_is_refused(width):
+    with pytest.raises(ConfigurationError, match="positive width"):
+        towards(0.0, 0.6, 0.0).with_gap(ROBOT, width)
+
+
+def test_a_landing_below_the_bottom_of_a_gap_is_refused():
+    with pytest.raises(ConfigurationError, match="below it"):
+        towards(0.0, 0.6, -0.4).with_gap(ROBOT, 0.2)
+
+
 def near_edge(request):
     box = request.terrain.boxes[0]
     return box.centre[0] - box.size[0] / 2

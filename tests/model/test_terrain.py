@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from aerial_model.terrain import Box, Terrain
+from aerial_model.terrain import GAP_DEPTH, Box, Terrain
 
 
 def test_a_platform_is_high_behind_its_near_edge_and_the_floor_before_it():
@@ -17,6 +17,18 @@ def test_a_platform_lies_in_the_direction_of_the_jump():
 def test_a_step_down_has_the_start_at_zero_and_the_floor_below():
     terrain = Terrain.platform(-0.16, 0.3, 0.0)
     np.testing.assert_allclose(terrain.height(np.array([[0.0, 0.0], [0.29, 0.0], [0.31, 0.0]])), [0.0, 0.0, -0.16])
+
+
+@pytest.mark.parametrize("height", [-0.1, 0.0, 0.1])
+def test_a_gap_is_deep_between_its_banks(height):
+    terrain = Terrain.gap(0.3, 0.25, 0.0, height)
+    points = np.array([[0.0, 0.0], [0.24, 0.0], [0.26, 0.0], [0.54, 0.0], [0.56, 0.0]])
+    np.testing.assert_allclose(terrain.height(points), [0.0, 0.0, -GAP_DEPTH, -GAP_DEPTH, height], atol=1e-12)
+
+
+def test_the_floor_of_a_placed_terrain_keeps_its_distance():
+    for terrain in (Terrain(), Terrain.platform(0.2, 0.3, 0.0), Terrain.gap(0.3, 0.25, 0.0)):
+        assert terrain.placed(np.array([0.0, 0.0, 0.5]), 0.3).floor == pytest.approx(0.5 + terrain.floor)
 
 
 def test_a_placed_terrain_has_the_same_heights_at_the_moved_points():

@@ -69,6 +69,12 @@ def test_a_hurdle_leaves_the_goal_on_the_ground():
     assert asked.terrain.boxes[0].top == pytest.approx(0.1)
 
 
+def test_a_gap_leaves_the_goal_on_the_far_bank():
+    near, far = request("jump --to 0.7,0 --gap 0.2 --edge 0.25").terrain.boxes
+    assert (near.top, far.top) == (0.0, 0.0)
+    assert far.centre[0] - far.size[0] / 2 == pytest.approx(0.45)
+
+
 @pytest.mark.parametrize("text", ["a,b", "1", "1,2,3,4", "1,,2", "nan,0", "inf,0,0", ""])
 def test_what_is_no_place_is_a_usage_error_with_an_example(text):
     with pytest.raises(argparse.ArgumentError, match=r"such as 0\.3,0,0"):
@@ -77,7 +83,12 @@ def test_what_is_no_place_is_a_usage_error_with_an_example(text):
 
 @pytest.mark.parametrize(
     ("options", "words"),
-    [("--edge 0.3", "none is asked for"), ("--platform 0", "other than 0"), ("--hurdle -0.1", "positive height")],
+    [
+        ("--edge 0.3", "none is asked for"),
+        ("--platform 0", "other than 0"),
+        ("--hurdle -0.1", "positive height"),
+        ("--gap 0", "positive width"),
+    ],
 )
 def test_options_that_contradict_each_other_are_usage_errors(options, words):
     with pytest.raises(UsageError, match=words):

@@ -247,6 +247,16 @@ def test_ipopt_finds_what_fatrop_finds(robot, forward):
             "binds: .*(voltage|torque)",
         ),
         (jump(0.3, 0.0, 0.16, terrain=Terrain.platform(0.16, 0.25, 0.0)), RefusalCode.CHECK_FAILED, "platform edge"),
+        (
+            jump(0.5, 0.0, terrain=Terrain.gap(0.2, 0.25, 0.0)),
+            RefusalCode.CHECK_FAILED,
+            "foot h[lr] would land at x 0.31",
+        ),
+        (
+            jump(0.9, 0.0, terrain=Terrain.gap(0.2, 0.15, 0.0)),
+            RefusalCode.INVALID_REQUEST,
+            "foot f[lr] stands at x 0.19",
+        ),
         (jump(0.4, 0.0, 0.16), RefusalCode.INVALID_REQUEST, "the ground there is 0.00 m"),
         (MotionRequest(motion="jump", rotation=0.5), RefusalCode.INVALID_REQUEST, "no rotation to set"),
         (jump(0.3, 0.0, variant="AKD"), RefusalCode.INVALID_REQUEST, "unknown variant 'AKD'"),

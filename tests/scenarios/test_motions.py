@@ -35,6 +35,13 @@ def test_a_jump_lands(robot, planner, displacement):
     assert outcome.landing.failed == ()
 
 
+@pytest.mark.parametrize("across", [False, True], ids=["hurdle", "gap"])
+def test_a_jump_over_an_obstacle_lands(robot, planner, across):
+    request = jump(robot, 0.8, 0.0, 0.0)
+    request = request.with_gap(robot, 0.3) if across else request.with_hurdle(robot, 0.1)
+    assert run(robot, request, seed=1, planner=planner).landing.failed == ()
+
+
 @pytest.mark.parametrize(
     ("motion", "goal"),
     [

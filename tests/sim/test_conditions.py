@@ -120,6 +120,18 @@ def test_the_robot_comes_to_stand_on_the_ground_where_it_is(robot, rise):
     np.testing.assert_allclose(heights[1] - heights[0], rise, atol=1e-4)
 
 
+@pytest.mark.parametrize("step", [0.00025, 0.001])
+def test_a_finer_physics_step_makes_the_ground_harder(robot, step):
+    sinking = []
+    for physics_step in (step, step / 2):
+        simulation = Simulation(robot, noise="off", conditions=Conditions(physics_step=physics_step))
+        for _ in range(500):
+            simulation.step(holding(robot))
+        q, _ = simulation.state()
+        sinking.append(robot.contact_points[0].radius - robot.contact_positions(q)[:, 2].min())
+    assert 0 < sinking[1] < 0.3 * sinking[0]
+
+
 def test_nothing_changes_without_conditions(robot):
     runs = []
     for conditions in (Conditions(), Conditions(push=1.0, ground_rise=0.02)):  # the last two are the runner's
@@ -132,7 +144,14 @@ def test_nothing_changes_without_conditions(robot):
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("mass", 0.0), ("friction", -0.1), ("battery", 0.0), ("latency", -1e-3), ("lost_commands", 1.0)],
+    [
+        ("mass", 0.0),
+        ("friction", -0.1),
+        ("battery", 0.0),
+        ("latency", -1e-3),
+        ("lost_commands", 1.0),
+        ("physics_step", 0.0),
+    ],
 )
 def test_what_cannot_be_is_refused_by_name(name, value):
     with pytest.raises(ValueError, match=name):

@@ -3,7 +3,7 @@ import pytest
 
 from aerial_model import rotation
 from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION
-from aerial_model.terrain import Box, Terrain
+from aerial_model.terrain import GAP_DEPTH, Box, Terrain
 from aerial_sim.placement import placed_ahead
 
 AHEAD = Terrain(boxes=(Box(centre=[0.8, 0.0, 0.1], size=[0.6, 0.9, 0.2]),))
@@ -48,7 +48,19 @@ def test_a_box_the_robot_only_overhangs_goes(robot, standing):
     assert placed_ahead(robot, standing([0.0, 0.0, 0.0], 0.0), low, Terrain()).boxes == ()
 
 
-def test_the_ground_of_a_step_down_is_there_already(robot, standing):
-    under = Terrain(boxes=(Box(centre=[0.0, 0.0, 0.1], size=[0.9, 0.9, 0.2]),))
+def test_a_terrain_that_falls_away_replaces_what_the_robot_stands_on(robot, standing):
+    under = Terrain(boxes=(Box(centre=[0.3, 0.0, 0.1], size=[0.9, 0.9, 0.2]),))
     step_down = Terrain(boxes=(Box(centre=[0.0, 0.0, -0.1], size=[0.9, 0.9, 0.2]),))
-    assert placed_ahead(robot, standing([0.0, 0.0, 0.2], 0.0), under, step_down).boxes == under.boxes
+    terrain = placed_ahead(robot, standing([0.0, 0.0, 0.2], 0.0), under, step_down)
+    assert len(terrain.boxes) == 1
+    np.testing.assert_allclose(terrain.boxes[0].centre, [0.0, 0.0, 0.1], atol=1e-9)
+    assert terrain.floor == pytest.approx(0.0)
+
+
+def test_a_gap_opens_in_the_floor_and_the_floor_stays_down(robot, standing):
+    q = standing([0.0, 0.0, 0.0], 0.0)
+    gap = placed_ahead(robot, q, Terrain(), Terrain.gap(0.2, 0.3, 0.0))
+    np.testing.assert_allclose(gap.height(np.array([[0.29, 0], [0.4, 0], [0.51, 0]])), [0, -GAP_DEPTH, 0], atol=1e-9)
+    afterwards = placed_ahead(robot, q, gap, Terrain())
+    assert len(afterwards.boxes) == 1
+    assert afterwards.floor == pytest.approx(-GAP_DEPTH)

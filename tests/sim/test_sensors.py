@@ -1,17 +1,23 @@
+import dataclasses
+
 import numpy as np
 import pytest
 
 from aerial_model import rotation
 from aerial_model.errors import ConfigurationError
+from aerial_model.robot import Robot
 from aerial_sim.sensors import SensorNoise, Sensors
 
 SAMPLES = 4000
-JOINTS = 12
+LAW = Robot.load("mini_cheetah").actuators
+JOINTS = len(LAW.gear_ratio)
+LOAD = np.full(JOINTS, 5.0)  # [N·m]
+COUNTS = 16384  # 14 bits
 
 
 @pytest.fixture
 def nominal():
-    return Sensors(SensorNoise(), JOINTS, np.random.default_rng(0))
+    return Sensors(SensorNoise(), LAW, np.random.default_rng(0))
 
 
 @pytest.fixture
@@ -48,7 +54,7 @@ def test_the_accelerometer_has_a_bias_of_full_size_on_every_axis(nominal):
 
 def test_encoders_are_off_by_a_constant(nominal):
     truth = np.linspace(-1, 1, JOINTS)
-    errors = samples(nominal.joint_position, truth) - truth
+    errors = samples(lambda joints: nominal.joint_position(joints, LOAD), truth) - truth
     np.testing.assert_allclose(np.abs(errors), 0.001, atol=1e-12)
     assert np.all(np.ptp(errors, axis=0) < 1e-12)
 
@@ -60,23 +66,62 @@ def test_joint_rates_have_gaussian_noise(nominal):
 
 
 def test_without_noise_sensors_tell_the_truth(robot, attitude):
-    sensors = Sensors(SensorNoise.of(robot, "off"), JOINTS, np.random.default_rng(0))
+    sensors = Sensors(SensorNoise.of(robot, "off"), LAW, np.random.default_rng(0))
     truth = np.array([1.0, 2.0, 3.0])
     joints = np.linspace(-1, 1, JOINTS)
     np.testing.assert_allclose(sensors.orientation(attitude), attitude, atol=1e-15)
     np.testing.assert_array_equal(sensors.angular_velocity(truth), truth)
     np.testing.assert_array_equal(sensors.linear_acceleration(truth), truth)
-    np.testing.assert_array_equal(sensors.joint_position(joints), joints)
+    np.testing.assert_array_equal(sensors.joint_position(joints, LOAD), joints)
     np.testing.assert_array_equal(sensors.joint_velocity(joints), joints)
 
 
 def test_bias_signs_differ_from_seed_to_seed(robot):
     noise = SensorNoise()
     draws = {
-        tuple(Sensors(noise, JOINTS, np.random.default_rng(seed)).joint_position(np.zeros(JOINTS)))
+        tuple(Sensors(noise, LAW, np.random.default_rng(seed)).joint_position(np.zeros(JOINTS), LOAD))
         for seed in range(20)
     }
     assert len(draws) == 20
+
+
+def exact(**options):
+    none = dict.fromkeys((field.name for field in dataclasses.fields(SensorNoise)), 0.0)
+    return Sensors(SensorNoise(**(none | options)), LAW, np.random.default_rng(0))
+
+
+def test_encoders_count_in_steps_of_the_motors_turn():
+    truth = np.random.default_rng(1).uniform(-1, 1, (SAMPLES, JOINTS))
+    sensors = exact(encoder_counts=COUNTS)
+    readings = np.array([sensors.joint_position(joints, LOAD) for joints in truth])
+    step = 2 * np.pi / (COUNTS * LAW.gear_ratio)
+    np.testing.assert_allclose(readings / step, np.round(readings / step), atol=1e-6)
+    np.testing.assert_allclose((readings - truth).std(axis=0), step / np.sqrt(12), rtol=0.05)
+
+
+def test_gears_play_with_the_sign_of_the_motors_torque():
+    sensors, joints = exact(gear_backlash=0.005), np.linspace(-1, 1, JOINTS)
+    for torque, play in (
+        (LOAD, 0.0025),
+        (0.1 * LAW.dry_friction, 0.0025),
+        (-LOAD, -0.0025),
+        (np.zeros(JOINTS), -0.0025),
+    ):
+        np.testing.assert_allclose(sensors.joint_position(joints, torque) - joints, play, atol=1e-15)
+
+
+def test_localization_comes_at_its_own_rate_with_its_own_noise():
+    sensors, truth = exact(localization_rate=60.0, localization_noise=0.01), np.array([1.0, 2.0, 3.0])
+    reports = [sensors.localization(0.002 * k, truth) for k in range(50_000)]
+    errors = np.array([report for report in reports if report is not None]) - truth
+    assert len(errors) == pytest.approx(0.002 * 50_000 * 60, abs=1)
+    np.testing.assert_allclose(errors.std(axis=0), 0.01, rtol=0.05)
+    np.testing.assert_allclose(errors.mean(axis=0), 0.0, atol=5e-4)
+
+
+def test_nominal_noise_has_neither_steps_nor_play_nor_localization(nominal):
+    assert (SensorNoise().encoder_counts, SensorNoise().gear_backlash, SensorNoise().localization_rate) == (0, 0, 0)
+    assert nominal.localization(0.0, np.zeros(3)) is None
 
 
 def test_a_robot_may_bring_its_own_noise(robot):

@@ -9,6 +9,7 @@ from aerial_model.kinematics import Kinematics
 from aerial_model.robot import BASE_ORIENTATION, JOINT_POSITION
 from aerial_model.state import Measurement
 from aerial_model.terrain import Box, Terrain
+from aerial_sim.conditions import Conditions
 from aerial_sim.simulation import Simulation
 
 GRAVITY = 9.81  # [m/s²]
@@ -161,6 +162,27 @@ def test_equal_seeds_and_commands_agree_to_the_last_bit(robot, hold, noise):
     assert all(fields_equal(first.step(hold), second.step(hold)) for _ in range(300))
 
 
+ALL_OPTIONS = {"encoder_counts": 16384, "gear_backlash": 0.005, "localization_rate": 100, "localization_noise": 0.01}
+
+
+def test_optional_sensors_are_repeatable_to_the_last_bit(robot, hold):
+    equipped = robot.with_section("sensors", **ALL_OPTIONS)
+    runs = []
+    for _ in range(2):
+        simulation = Simulation(equipped, seed=4)
+        runs.append([simulation.measure(), *(simulation.step(hold) for _ in range(20))])
+    assert all(fields_equal(one, other) for one, other in zip(*runs, strict=True))
+    assert [reading.localization is not None for reading in runs[0]] == [k % 5 == 0 for k in range(21)]
+
+
+def test_localization_counts_from_where_the_robot_started(robot, hold):
+    equipped = robot.with_section("sensors", localization_rate=500, localization_noise=0.0)
+    simulation = Simulation(equipped, terrain=PLATFORM, seed=1)
+    q, _ = simulation.state()
+    origin, _ = robot.start_frame(q)
+    np.testing.assert_allclose(simulation.measure().localization, q[:3] - origin, atol=1e-12)
+
+
 def test_reset_forgets_everything(robot, hold, torque_command):
     fresh, used = Simulation(robot, seed=7), Simulation(robot, seed=6)
     used.disturb([30.0, 0.0, 0.0], 10.0, added_mass=2.0, friction_coefficient=0.1)
@@ -217,6 +239,13 @@ def test_added_mass_weighs_and_survives_new_terrain(robot, hold):
     assert truth.force[:, 2].sum() == pytest.approx((robot.mass + 1.0) * GRAVITY, abs=0.01)
 
 
+def test_a_trunk_without_mass_is_refused_and_nothing_changes(robot, hold):
+    simulation = Simulation(robot, noise="off")
+    with pytest.raises(ConfigurationError, match="leave nothing of the trunk"):
+        simulation.disturb(added_mass=-10.0, friction_coefficient=0.0)
+    assert advance(simulation, hold, STAND_TIME).force[:, 2].sum() == pytest.approx(robot.mass * GRAVITY, rel=0.01)
+
+
 def test_on_ice_feet_slide(robot, hold):
     simulation = Simulation(robot, noise="off")
     advance(simulation, hold, STAND_TIME)
@@ -239,4 +268,4 @@ def test_an_unknown_noise_is_refused(robot):
 
 def test_periods_that_do_not_fit_are_refused(robot):
     with pytest.raises(ConfigurationError, match="multiple"):
-        Simulation(robot, physics_dt=0.0007)
+        Simulation(robot, conditions=Conditions(physics_step=0.0007))

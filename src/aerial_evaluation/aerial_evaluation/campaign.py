@@ -183,8 +183,7 @@ def summary(done: Sequence[Mapping[str, Any]], variations: Sequence[Variation] =
     if stepped is not None:
         for value in stepped.values():
             group = [result for result in done if result["conditions"][stepped.name] == value]
-            groups.append({stepped.name: value, **_share(group)})
-    landed = [result for result in done if result["landed"]]
+            groups.append({stepped.name: value, **_share(group), "figures": _figures(group)})
     return {
         **_share(done),
         "failures": [
@@ -193,8 +192,14 @@ def summary(done: Sequence[Mapping[str, Any]], variations: Sequence[Variation] =
             if not result["landed"]
         ],
         "conditions": groups,
-        "figures": {name: _spread([result[name] for result in landed]) for name in FIGURES} if landed else {},
+        "figures": _figures(done),
     }
+
+
+def _figures(done: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, float]]:
+    """Return the spread of every figure over the trials that landed."""
+    landed = [result for result in done if result["landed"]]
+    return {name: _spread([result[name] for result in landed]) for name in FIGURES} if landed else {}
 
 
 def _unusual(conditions: Mapping[str, float]) -> dict[str, float]:

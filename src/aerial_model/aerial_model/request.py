@@ -12,10 +12,11 @@ from aerial_model import rotation
 from aerial_model.config import frozen_array
 from aerial_model.errors import ConfigurationError
 from aerial_model.robot import Robot
-from aerial_model.terrain import HURDLE_THICKNESS, PLATFORM_LENGTH, Terrain
+from aerial_model.terrain import GAP_DEPTH, HURDLE_THICKNESS, PLATFORM_LENGTH, Terrain
 
-UPPER_MARGIN = 0.08  # of feet that land on a platform from its edge [m]: more than the least, for landings off the goal
-LOWER_MARGIN = 0.03  # of feet below it, or standing on it, from its edge [m]
+# Of feet that land on a platform or a gap's bank, from its edge [m]: more than the least, for landings off the goal.
+UPPER_MARGIN = 0.08
+LOWER_MARGIN = 0.03  # of feet below an edge, or standing on it, from it [m]
 
 
 class ControllerCommand(StrEnum):
@@ -88,6 +89,28 @@ class MotionRequest:
         if edge is None:
             edge = float(np.mean([self._standing_feet(robot)[1], self._landing_feet(robot)[0]])) - HURDLE_THICKNESS / 2
         return self._on(Terrain.hurdle(height, edge, self.direction))
+
+    def with_gap(self, robot: Robot, width: float, edge: float | None = None) -> MotionRequest:
+        """Return this request with a trench across the jump; its far bank is as high as the goal.
+
+        Args:
+            robot: whose feet must fit.
+            width: of the trench [m].
+            edge: distance to it [m]; None: midway between standing and landing feet, but not under the standing ones.
+
+        Raises:
+            ConfigurationError: if the width is not a positive number, or the far bank would lie below the gap's bottom.
+        """
+        height = float(self.displacement[2])
+        if not 0 < width < np.inf:
+            raise ConfigurationError(f"gap: expected a positive width, found {width}")
+        if height <= -GAP_DEPTH:
+            raise ConfigurationError(f"gap: it is {GAP_DEPTH} m deep, a landing {height} m high would lie below it")
+        if edge is None:
+            front = self._standing_feet(robot)[1]
+            middle = (front + self._landing_feet(robot)[0]) / 2
+            edge = max(middle - width / 2, front + UPPER_MARGIN)
+        return self._on(Terrain.gap(width, edge, self.direction, height))
 
     def _on(self, terrain: Terrain) -> MotionRequest:
         boxes = self.terrain.boxes + terrain.boxes

@@ -1,7 +1,7 @@
-"""The ground: a flat floor plus boxes (platforms, hurdles, steps), all in one frame.
+"""The ground: a flat floor plus boxes (platforms, hurdles, steps, the banks of a gap), all in one frame.
 
-The floor lies at height 0, or at the lowest box bottom where that is below: a start on top of a platform is a box whose
-upper face is at 0, so that the floor around it is a step down.
+The floor lies at the terrain's base, or at the lowest box bottom where that is below: a start on top of a platform is a
+box whose upper face is at 0, so that the floor around it is a step down; a gap is what two such boxes leave between them.
 """
 
 from __future__ import annotations
@@ -17,6 +17,9 @@ PLATFORM_LENGTH = 0.9  # [m] along the jump: a stance and room to land off the g
 PLATFORM_WIDTH = 0.9  # [m]
 HURDLE_THICKNESS = 0.03  # [m]
 HURDLE_WIDTH = 0.9  # [m]
+BANK_LENGTH = 1.5  # of the ground on either side of a gap, along the jump [m]
+BANK_WIDTH = 0.9  # [m]
+GAP_DEPTH = 0.3  # [m] about the height a robot here stands at: who falls in has not landed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +61,7 @@ class Terrain:
     """A flat floor and boxes on it, in the start heading frame unless said otherwise."""
 
     boxes: tuple[Box, ...] = field(default_factory=tuple)
+    base: float = 0.0  # height of the floor, unless a box reaches deeper [m]
 
     @staticmethod
     def platform(height: float, edge: float, direction: float) -> Terrain:
@@ -90,10 +94,23 @@ class Terrain:
             boxes=(Box(centre=centre, size=np.array([HURDLE_THICKNESS, HURDLE_WIDTH, height]), yaw=direction),)
         )
 
+    @staticmethod
+    def gap(width: float, edge: float, direction: float, height: float = 0.0) -> Terrain:
+        """Return a trench across the jump, between the ground jumped from and that jumped onto.
+
+        Args:
+            width: of the trench, along the jump [m].
+            edge: distance from the origin, along the jump, to the trench [m].
+            direction: of the jump, angle from x [rad].
+            height: of the far bank above the near one [m].
+        """
+        near = _bank(edge - BANK_LENGTH / 2, 0.0, direction)
+        return Terrain(boxes=(near, _bank(edge + width + BANK_LENGTH / 2, height, direction)))
+
     @property
     def floor(self) -> float:
         """Height of the flat floor [m]."""
-        return min([0.0, *(float(box.centre[2] - box.size[2] / 2) for box in self.boxes)])
+        return min([self.base, *(float(box.centre[2] - box.size[2] / 2) for box in self.boxes)])
 
     def height(self, points: np.ndarray, margin: float = 0.0) -> np.ndarray:
         """Return the height [m] of the ground under points ``(..., 2+)`` [m], boxes grown by ``margin`` [m]."""
@@ -105,4 +122,12 @@ class Terrain:
 
     def placed(self, origin: np.ndarray, yaw: float) -> Terrain:
         """Return the terrain expressed in a frame where its own stands at ``origin`` ``(3,)``, turned by ``yaw``."""
-        return Terrain(boxes=tuple(box.placed(origin, yaw) for box in self.boxes))
+        boxes = tuple(box.placed(origin, yaw) for box in self.boxes)
+        return Terrain(boxes=boxes, base=float(origin[2]) + self.base)
+
+
+def _bank(middle: float, top: float, direction: float) -> Box:
+    """Return a box from the bottom of a gap up to ``top``, its middle at a distance along the jump; all in [m]."""
+    size = np.array([BANK_LENGTH, BANK_WIDTH, top + GAP_DEPTH])
+    centre = np.array([middle * np.cos(direction), middle * np.sin(direction), (top - GAP_DEPTH) / 2])
+    return Box(centre=centre, size=size, yaw=direction)

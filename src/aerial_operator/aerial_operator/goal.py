@@ -47,6 +47,7 @@ def add_goal_arguments(parser: argparse.ArgumentParser, more: str = "") -> None:
     kind = terrain.add_mutually_exclusive_group()
     kind.add_argument("--platform", metavar="H", type=finite, help="box to jump onto, H high [m]; or off, if negative")
     kind.add_argument("--hurdle", metavar="H", type=finite, help="thin bar to jump over, H high [m]")
+    kind.add_argument("--gap", metavar="W", type=finite, help="trench to jump across, W wide [m]")
     terrain.add_argument("--edge", metavar="D", type=finite, help="its near edge is D ahead [m] (default: as feet fit)")
 
 
@@ -73,8 +74,10 @@ def _request(args: argparse.Namespace, robot: Robot, fields: dict[str, object]) 
     )
     if args.hurdle is not None:
         return request.with_hurdle(robot, args.hurdle, args.edge)
+    if args.gap is not None:
+        return request.with_gap(robot, args.gap, args.edge)
     if args.platform is not None or landing_height != 0:
         return request.with_platform(robot, args.platform, args.edge)
     if args.edge is not None:
-        raise UsageError("--edge is that of a platform or hurdle: none is asked for")
+        raise UsageError("--edge is that of a platform, hurdle or gap: none is asked for")
     return request

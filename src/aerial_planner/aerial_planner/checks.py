@@ -8,6 +8,7 @@ from aerial_model import rotation
 from aerial_model.errors import RefusalCode, RefusalError
 from aerial_model.plan import Plan
 from aerial_model.robot import BASE_ORIENTATION, JOINT_POSITION, Robot
+from aerial_model.terrain import Terrain
 from aerial_planner.assembly import ActuatorUse
 from aerial_planner.schedule import Schedule
 from aerial_planner.transcription import Solution
@@ -39,7 +40,7 @@ def check(
     _check_turn(plan, schedule)
     _check_actuators(use, plan, robot, actuator_tolerance)
     _check_joint_range(plan, robot)
-    _check_landing_feet(plan, robot)
+    check_landing_feet(plan.terrain, plan.foot_position[-1], plan.landing_support_centre[2], robot)
 
 
 def clearance_deficit(plan: Plan, robot: Robot) -> float:
@@ -113,14 +114,17 @@ def _check_joint_range(plan: Plan, robot: Robot) -> None:
         )
 
 
-def _check_landing_feet(plan: Plan, robot: Robot) -> None:
-    """Check that the landing feet stand on the landing surface, away from any edge."""
-    surface = plan.landing_support_centre[2]
-    for point, foot in zip(robot.contact_points, plan.foot_position[-1], strict=True):
+def check_landing_feet(terrain: Terrain, feet: np.ndarray, surface: float, robot: Robot) -> None:
+    """Check that landing feet ``(n_c, 3)`` stand on the landing surface, away from any edge; all in S [m].
+
+    Raises:
+        RefusalError: naming the foot and where it would land.
+    """
+    for point, foot in zip(robot.contact_points, feet, strict=True):
         offsets = EDGE_MARGIN * np.array([[0, 0], [1, 1], [1, -1], [-1, 1], [-1, -1]])
-        ground = plan.terrain.height(foot[:2] + offsets)
+        ground = terrain.height(foot[:2] + offsets)
         if np.any(np.abs(ground - surface) > 1e-6):
             raise _refuse(
                 f"platform edge: foot {point.name} would land at x {foot[0]:.2f}, y {foot[1]:.2f} m, where the ground is "
-                f"{ground[0]:.2f} m high within {EDGE_MARGIN} m of an edge; the landing surface is {surface:.2f} m high"
+                f"{ground[np.argmax(np.abs(ground - surface))]:.2f} m high within {EDGE_MARGIN} m of an edge; the landing surface is {surface:.2f} m high"
             )

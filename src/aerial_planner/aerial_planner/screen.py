@@ -3,26 +3,32 @@
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 
 from aerial_model.errors import RefusalCode, RefusalError
 from aerial_model.request import MotionRequest
 from aerial_model.robot import Robot
+from aerial_planner.checks import check_landing_feet
 from aerial_planner.reference import Reference
 from aerial_planner.schedule import GRAVITY, Schedule
 
+_GROUND_TOLERANCE = 1e-6  # between heights that are meant to be equal [m]
+
 
 def screen(request: MotionRequest, schedule: Schedule, reference: Reference, robot: Robot) -> None:
-    """Check that terrain and goal agree, and that the take-off's energy is within the motors' power.
+    """Check that terrain, stance and goal agree, and that the take-off's energy is within the motors' power.
 
     Raises:
         RefusalError: naming what binds.
     """
     ground = float(request.terrain.height(schedule.landing_centre))
-    if abs(ground - schedule.landing_centre[2]) > 1e-6:
+    if abs(ground - schedule.landing_centre[2]) > _GROUND_TOLERANCE:
         raise RefusalError(
             RefusalCode.INVALID_REQUEST,
             f"the goal is {schedule.landing_centre[2]:.2f} m high, but the ground there is {ground:.2f} m high",
         )
+    _check_stance(request, reference, robot)
+    check_landing_feet(request.terrain, _landing_feet(schedule, reference, robot), ground, robot)
     velocity = reference.com_velocity[-1]
     energy = robot.mass * (0.5 * float(velocity @ velocity) + GRAVITY * (reference.com[-1, 2] - reference.com[0, 2]))
     law = robot.actuators
@@ -36,3 +42,22 @@ def screen(request: MotionRequest, schedule: Schedule, reference: Reference, rob
             f"out of reach: the take-off needs {energy:.0f} J, all motors together give {available:.0f} J "
             f"in {schedule.take_off_time:.2f} s",
         )
+
+
+def _check_stance(request: MotionRequest, reference: Reference, robot: Robot) -> None:
+    """Check that the standing feet stand on the ground jumped from."""
+    heights = request.terrain.height(reference.foot_position)
+    for point, foot, height in zip(robot.contact_points, reference.foot_position, heights, strict=True):
+        if abs(height) > _GROUND_TOLERANCE:
+            raise RefusalError(
+                RefusalCode.INVALID_REQUEST,
+                f"platform edge: foot {point.name} stands at x {foot[0]:.2f}, y {foot[1]:.2f} m, where the terrain asked for "
+                f"is {height:.2f} m high; the ground jumped from is 0 m high",
+            )
+
+
+def _landing_feet(schedule: Schedule, reference: Reference, robot: Robot) -> np.ndarray:
+    """Return where the contact points ``(n_c, 3)`` [m] meet the ground if all goes as in the reference, in S."""
+    q = np.concatenate([np.zeros(3), schedule.landing_orientation, reference.landing_joint_position])
+    com = pin.centerOfMass(robot.model, robot.model.createData(), q)
+    return robot.contact_positions(q) + reference.landing_com - com

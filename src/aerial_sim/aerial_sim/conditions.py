@@ -6,12 +6,14 @@ from dataclasses import dataclass, fields
 
 from aerial_sim.world import FRICTION_COEFFICIENT
 
+PHYSICS_STEP = 0.0005  # [s]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Conditions:
     """One world; the defaults are what is counted on.
 
-    The last two happen in the middle of a flight: whoever runs the simulation lets them.
+    Ground rise and push happen in the middle of a flight: whoever runs the simulation lets them.
     """
 
     mass: float = 1.0  # of the robot over its model's; the difference sits at the trunk's centre of mass
@@ -22,9 +24,10 @@ class Conditions:
     battery_resistance: float = 0.0  # by which the voltage sags under load [Ω]
     ground_rise: float = 0.0  # of the ground while the robot is in the air [m]
     push: float = 0.0  # on the trunk at the apex, level, in a direction drawn from the seed [N·s]
+    physics_step: float = PHYSICS_STEP  # of the simulator itself; the ground is as hard as it allows [s]
 
     def __post_init__(self) -> None:
-        for name in ("mass", "friction", "battery"):
+        for name in ("mass", "friction", "battery", "physics_step"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be positive, found {getattr(self, name)}")
         for name in ("latency", "battery_resistance"):

@@ -15,6 +15,7 @@ def placed_ahead(robot: Robot, q: np.ndarray, present: Terrain, selected: Terrai
 
     The boxes the robot stands on stay, all others go, and the selected ones come, each built up from the floor.
     Selected boxes that do not rise above the start are the ground the robot stands on already: they are left out.
+    A terrain that falls away below the start (a step down, a gap) says itself what the robot stands on: it replaces all.
 
     Args:
         robot: that stands there.
@@ -27,8 +28,10 @@ def placed_ahead(robot: Robot, q: np.ndarray, present: Terrain, selected: Terrai
     kept = [box for box in present.boxes if np.any(box.covers(feet) & (np.abs(soles - box.top) < FOOTING))]
     origin, heading = robot.start_frame(q)
     origin = np.array([origin[0], origin[1], present.height(feet).max()])
+    if selected.floor < -FOOTING:
+        return selected.placed(origin, heading)
     new = [box.placed(origin, heading) for box in selected.boxes if box.top > FOOTING]
-    return Terrain(boxes=(*kept, *(_from_floor(box, present.floor) for box in new)))
+    return Terrain(boxes=(*kept, *(_from_floor(box, present.floor) for box in new)), base=present.floor)
 
 
 def _from_floor(box: Box, floor: float) -> Box:

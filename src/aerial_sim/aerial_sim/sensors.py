@@ -4,6 +4,9 @@ Nominal figures: FACTS of the Mini Cheetah's software simulator for the uniform 
 ``simulator-defaults.yaml``: attitude ±0.003 rad, gyro and accelerometer ±0.005); biases and joint-rate noise are this
 project's, larger than the data sheets of the inertial unit (VN-100) and the encoders (AS5047P) promise.
 A bias has its full size on every axis and joint and a random sign: no seed is an easy one.
+
+Off unless asked for: steps of the encoders (14 bits a turn of the motor for the AS5047P), play of the gears (0.005 rad at
+the joint, B. Katz's figure) and an outside localization (millimetres; nobody has published a figure).
 """
 
 from __future__ import annotations
@@ -13,8 +16,11 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from aerial_model import rotation
+from aerial_model.actuator import ActuatorLaw
 from aerial_model.errors import ConfigurationError
 from aerial_model.robot import Robot
+
+_ROUNDING = 1e-6  # periods of the localization: sums of control periods are not exact
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +34,10 @@ class SensorNoise:
     accelerometer_noise: float = 0.005  # ± [m/s²]
     encoder_bias: float = 0.001  # [rad]
     joint_rate_noise: float = 0.05  # Gaussian, rms [rad/s]
+    encoder_counts: float = 0.0  # in a turn of the motor; 0: no steps
+    gear_backlash: float = 0.0  # from flank to flank, at the joint [rad]
+    localization_rate: float = 0.0  # at which an outside source reports the base's position; 0: there is none [Hz]
+    localization_noise: float = 0.0075  # Gaussian, rms, per axis [m]
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -53,16 +63,20 @@ class Sensors:
 
     Args:
         noise: sizes of the errors.
-        n_joints: number of joints.
+        law: of the motors, whose side of the gears the encoders are on.
         random: source of biases and noise.
     """
 
-    def __init__(self, noise: SensorNoise, n_joints: int, random: np.random.Generator) -> None:
+    def __init__(self, noise: SensorNoise, law: ActuatorLaw, random: np.random.Generator) -> None:
         self._noise = noise
         self._random = random
         self._attitude_bias = self._signs(3) * noise.attitude_bias
         self._accelerometer_bias = self._signs(3) * noise.accelerometer_bias
-        self._encoder_bias = self._signs(n_joints) * noise.encoder_bias
+        self._encoder_bias = self._signs(len(law.gear_ratio)) * noise.encoder_bias
+        self._encoder_step = 2 * np.pi / (noise.encoder_counts * law.gear_ratio) if noise.encoder_counts else None
+        self._dry_friction = law.dry_friction
+        self._flank = np.zeros(len(law.gear_ratio))  # −1 or 1: to which side the motors press the gears' teeth
+        self._fixes = 0  # positions reported by the outside source
 
     def orientation(self, attitude: np.ndarray) -> np.ndarray:
         """Return the reported attitude ``(4,)`` of a base with the true one ``(4,)``, quaternions xyzw."""
@@ -77,13 +91,30 @@ class Sensors:
         """Return the accelerometer's reading ``(3,)`` [m/s²] in B."""
         return specific_force + self._accelerometer_bias + self._uniform(3, self._noise.accelerometer_noise)
 
-    def joint_position(self, position: np.ndarray) -> np.ndarray:
-        """Return the encoders' reading ``(n,)`` [rad]."""
-        return position + self._encoder_bias
+    def joint_position(self, position: np.ndarray, torque: np.ndarray) -> np.ndarray:
+        """Return the encoders' reading ``(n,)`` [rad].
+
+        Args:
+            position: of the joints ``(n,)`` [rad].
+            torque: of the motors ``(n,)``; what overcomes dry friction moves them through the gears' play [N·m].
+        """
+        pressing = np.abs(torque) > self._dry_friction
+        self._flank[pressing] = np.sign(torque[pressing])
+        of_motor = position + self._noise.gear_backlash / 2 * self._flank
+        if self._encoder_step is not None:
+            of_motor = self._encoder_step * np.round(of_motor / self._encoder_step)
+        return of_motor + self._encoder_bias
 
     def joint_velocity(self, velocity: np.ndarray) -> np.ndarray:
         """Return the reported joint rates ``(n,)`` [rad/s]."""
         return velocity + self._random.normal(0.0, self._noise.joint_rate_noise, len(velocity))
+
+    def localization(self, time: float, position: np.ndarray) -> np.ndarray | None:
+        """Return the outside source's report of a position ``(3,)`` [m]; None if none is due at ``time`` [s]."""
+        if time * self._noise.localization_rate < self._fixes - _ROUNDING or not self._noise.localization_rate:
+            return None
+        self._fixes += 1
+        return position + self._random.normal(0.0, self._noise.localization_noise, 3)
 
     def _signs(self, n: int) -> np.ndarray:
         return self._random.choice([-1.0, 1.0], n)

@@ -33,7 +33,6 @@ from aerial_sim.ground_truth import GroundTruth
 from aerial_sim.sensors import SensorNoise, Sensors
 from aerial_sim.world import XYZW, World, build
 
-PHYSICS_DT = 0.0005  # [s]
 CONTROL_DT = 0.002  # [s]
 FLAT = Terrain()
 AS_EXPECTED = Conditions()
@@ -48,9 +47,8 @@ class Simulation:
         terrain: expressed in W.
         noise: ``"nominal"`` or ``"off"``; ``"off"`` also starts exactly in the home pose, heading along x.
         seed: of noise, biases, starting joint offsets and heading.
-        physics_dt: MuJoCo's step [s].
-        control_dt: period of commands and measurements [s], a multiple of ``physics_dt``.
-        conditions: of battery, drives, robot and ground, from the start on.
+        control_dt: period of commands and measurements, a multiple of the physics step [s].
+        conditions: of battery, drives, robot and ground, from the start on, and MuJoCo's step.
 
     Raises:
         ConfigurationError: for an unknown noise, periods that do not fit, or a URDF that MuJoCo cannot use.
@@ -63,10 +61,10 @@ class Simulation:
         terrain: Terrain = FLAT,
         noise: str = "nominal",
         seed: int = 0,
-        physics_dt: float = PHYSICS_DT,
         control_dt: float = CONTROL_DT,
         conditions: Conditions = AS_EXPECTED,
     ) -> None:
+        physics_dt = conditions.physics_step
         steps = round(control_dt / physics_dt)
         if steps < 1 or not np.isclose(steps * physics_dt, control_dt, rtol=1e-9, atol=0.0):
             raise ConfigurationError(f"control period {control_dt} s is no multiple of the physics step {physics_dt} s")
@@ -90,7 +88,7 @@ class Simulation:
         Disturbances end; the terrain stays.
         """
         random = np.random.default_rng(seed)
-        self._sensors = Sensors(self._noise, self.robot.n_joints, random)
+        self._sensors = Sensors(self._noise, self.robot.actuators, random)
         q = self.robot.standing_configuration()
         q[JOINT_POSITION] += random.uniform(-self._start_offset, self._start_offset, self.robot.n_joints)
         turn = rotation.about_z(random.uniform(-self._start_heading, self._start_heading))
@@ -99,6 +97,7 @@ class Simulation:
         points = self.robot.contact_positions(q)
         radii = np.array([point.radius for point in self.robot.contact_points])
         q[2] += np.max(self.terrain.height(points) - (points[:, 2] - radii))
+        self._origin, _ = self.robot.start_frame(q)  # of what an outside source reports: as of an estimator begun here
         mujoco.mj_resetData(self._world.model, self._data)
         conditions = self._conditions
         added_mass = (conditions.mass - 1.0) * self.robot.mass
@@ -192,7 +191,14 @@ class Simulation:
             added_mass: fixed to the trunk's centre of mass from now on, replacing what was added before [kg].
             friction_coefficient: of the ground from now on.
             ground_rise: of floor and boxes over where the terrain has them, from now on [m].
+
+        Raises:
+            ConfigurationError: if the trunk would have no mass left; nothing changes then.
         """
+        if added_mass is not None and self._trunk_mass + added_mass <= 0:
+            raise ConfigurationError(
+                f"added mass: {added_mass:.2f} kg would leave nothing of the trunk's {self._trunk_mass:.2f} kg"
+            )
         if force is not None:
             self._data.xfrc_applied[self._world.trunk, :3] = force
             self._push_until = self.time + duration
@@ -251,10 +257,11 @@ class Simulation:
             orientation=self._sensors.orientation(q[BASE_ORIENTATION]),
             angular_velocity=self._sensors.angular_velocity(v[BASE_ANGULAR]),
             linear_acceleration=self._sensors.linear_acceleration(self._R_WB().T @ specific_force),
-            joint_position=self._sensors.joint_position(q[JOINT_POSITION]),
+            joint_position=self._sensors.joint_position(q[JOINT_POSITION], self._drive.delivered_torque),
             joint_velocity=self._sensors.joint_velocity(v[JOINT_VELOCITY]),
             joint_torque=self._drive.delivered_torque,
             sequence=self._ticks,
+            localization=self._sensors.localization(self.time, q[BASE_POSITION] - self._origin),
         )
 
     def _R_WB(self) -> np.ndarray:  # noqa: N802

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from aerial_evaluation.campaign import Campaign, results, summary, trials, workers
+from aerial_evaluation.campaign import FIGURES, Campaign, results, summary, trials, workers
 from aerial_evaluation.campaign_figure import draw
 from aerial_model.robot import Robot
 from aerial_operator.console import ProgressBar, Report, UsageError, pairs, say, table, to_json
@@ -26,6 +26,7 @@ _PASSED_ON = {  # what a trial alone must be told, and what it takes to be so
     "rotation": None,
     "platform": None,
     "hurdle": None,
+    "gap": None,
     "edge": None,
     "variant": "AAKD*",
     "solver": "fatrop",
@@ -103,6 +104,10 @@ def _command(args: argparse.Namespace, failure: Mapping[str, Any]) -> str:
     return shlex.join([*words, "--seed", str(failure["seed"]), "--picture", "trial.png"])
 
 
+def _median(row: Mapping[str, Any], figure: str) -> str:
+    return f"{row['figures'][figure]['p50']:.3g}" if row["figures"] else "–"
+
+
 def _text(figures: Mapping[str, Any]) -> str:
     low, high = figures["interval95"]
     parts = [
@@ -111,8 +116,11 @@ def _text(figures: Mapping[str, Any]) -> str:
     ]
     if figures["conditions"]:
         name = next(iter(figures["conditions"][0]))
-        rows = [[f"{row[name]:g}", f"{row['landed']} of {row['trials']}"] for row in figures["conditions"]]
-        parts.append(table([name, "landed"], rows))
+        rows = [
+            [f"{row[name]:g}", f"{row['landed']} of {row['trials']}", *(_median(row, figure) for figure in FIGURES)]
+            for row in figures["conditions"]
+        ]
+        parts.append(table([name, "landed", *(f"median {figure}" for figure in FIGURES)], rows))
     if figures["figures"]:
         rows = [
             [name, *(f"{spread[key]:.3g}" for key in ("p50", "p95", "max"))]

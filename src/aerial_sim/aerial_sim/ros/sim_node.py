@@ -17,7 +17,7 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
-from aerial_model.errors import RefusalError
+from aerial_model.errors import ConfigurationError, RefusalError
 from aerial_model.request import ControllerCommand
 from aerial_model.robot import Robot
 from aerial_model.ros import qos
@@ -302,15 +302,18 @@ class SimNode(AerialNode):
 
     def _disturb(self, request: Disturb.Request, response: Disturb.Response) -> Disturb.Response:
         response.message = _why_no_disturbance(request)
+        if not response.message:
+            try:
+                with self._lock:
+                    self._session.simulation.disturb(
+                        np.array(request.force) if request.duration > 0 else None,
+                        request.duration,
+                        added_mass=request.added_mass if request.has_added_mass else None,
+                        friction_coefficient=request.friction_coefficient if request.has_friction_coefficient else None,
+                    )
+            except ConfigurationError as error:
+                response.message = str(error)
         response.success = not response.message
-        if response.success:
-            with self._lock:
-                self._session.simulation.disturb(
-                    np.array(request.force) if request.duration > 0 else None,
-                    request.duration,
-                    added_mass=request.added_mass if request.has_added_mass else None,
-                    friction_coefficient=request.friction_coefficient if request.has_friction_coefficient else None,
-                )
         return response
 
     def _parameter(self, name: str) -> Any:
