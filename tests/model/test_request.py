@@ -38,7 +38,7 @@ def test_all_landing_feet_stand_on_the_platform_and_no_standing_foot_under_it(di
 @given(direction=angles, distance=st.floats(0.6, 1.2), height=st.floats(-0.4, -0.05))
 def test_a_step_down_leaves_the_stance_on_top_and_the_landing_feet_on_the_floor(direction, distance, height):
     request = towards(direction, distance, height).with_platform(ROBOT)
-    assert np.all(request.terrain.boxes[0].covers(STANDING, margin=-UPPER_MARGIN + TOLERANCE))
+    assert np.all(request.terrain.boxes[0].covers(STANDING, margin=-LOWER_MARGIN + TOLERANCE))
     np.testing.assert_allclose(request.terrain.height(landing_feet(request), margin=LOWER_MARGIN - TOLERANCE), height)
 
 

@@ -119,7 +119,8 @@ class MotionRequest:
     def _platform_edge(self, robot: Robot, *, down: bool) -> float:
         """Return the distance [m] of the edge to jump over.
 
-        Feet that land on the platform keep ``UPPER_MARGIN``, the others at least ``LOWER_MARGIN``; where both cannot be, the edge is halfway between. Flying feet clear an edge the more easily the nearer it is to the upper feet.
+        Feet that land on the platform keep ``UPPER_MARGIN``, the others at least ``LOWER_MARGIN``; where both cannot be,
+        the edge is halfway between. Flying feet clear an edge the more easily the nearer it is to the upper feet.
         """
         rear_standing, front_standing = self._standing_feet(robot)
         rear_landing, front_landing = self._landing_feet(robot)

@@ -35,6 +35,7 @@ from aerial_planner.symbolic import (
 from aerial_planner.trajectory import TakeOffTrajectory
 from aerial_planner.transcription import Solution, SolverOptions
 
+_ITERATIONS_MAX = 35  # of one try: those that succeed take 10 to 30
 _REACH_SAMPLES = 2000  # random poses from which the longest leg is read
 
 
@@ -50,6 +51,7 @@ class SingleRigidBody(Formulation):
         options: SolverOptions,
         library: FunctionLibrary | None = None,
     ) -> None:
+        options = dataclasses.replace(options, max_iterations=min(options.max_iterations, _ITERATIONS_MAX))
         super().__init__(robot, model, settings, options, library)
         self.ik = ik
         home = robot.poses["home"]
