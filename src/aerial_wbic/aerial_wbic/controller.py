@@ -25,7 +25,7 @@ from aerial_wbic.gains import ControllerGains
 from aerial_wbic.phase import FOLLOWING, Phase, Phases
 from aerial_wbic.qp import ForceOptimization, Room
 from aerial_wbic.target import GRAVITY, Fold, PostureTarget, WholeBodyTarget
-from aerial_wbic.tasks import Limbs, attitude_error, command
+from aerial_wbic.tasks import Arrangement, Limbs, attitude_error, command
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,6 +58,7 @@ class Controller:
         self.robot = robot
         self._gains = robot.section("controller", ControllerGains)
         self._limbs = Limbs(robot)
+        self._arrangement = Arrangement.of(self._gains)
         self._kinematics = Kinematics(robot)
         self._qp = ForceOptimization(robot, self._gains.weight_base, self._gains.weight_force)
         self._estimator = Estimator(robot, self._gains.estimator)
@@ -87,8 +88,7 @@ class Controller:
         self._now = (state, target)
         if not isinstance(target, WholeBodyTarget):
             return self._drive.resting(target, measurement)
-        gains, swinging = self._gains, self._limbs.swinging(target.contact)
-        vdot_cmd, v_ref = command(state, target, swinging, gains.swing_joint, gains.angular_momentum_damping)
+        vdot_cmd, v_ref = command(state, target, self._limbs.joints(target.contact), self._arrangement)
         solution = self._qp.solve(state, vdot_cmd, target.force, target.contact)
         self._fallback_ticks += not solution.solved
         room = self._drive.room(v_ref, measurement)
