@@ -60,7 +60,8 @@ class Controller:
         self._limbs = Limbs(robot)
         self._arrangement = Arrangement.of(self._gains)
         self._kinematics = Kinematics(robot)
-        self._qp = ForceOptimization(robot, self._gains.weight_base, self._gains.weight_force)
+        gains = self._gains
+        self._qp = ForceOptimization(robot, gains.weight_base, gains.weight_force, gains.qp_solver)
         self._estimator = Estimator(robot, self._gains.estimator)
         self._home_height = _home_height(robot, self._kinematics)
         self.reset()
@@ -88,7 +89,7 @@ class Controller:
         self._now = (state, target)
         if not isinstance(target, WholeBodyTarget):
             return self._drive.resting(target, measurement)
-        vdot_cmd, v_ref = command(state, target, self._limbs.joints(target.contact), self._arrangement)
+        vdot_cmd, v_ref = self._accelerations(state, target)
         solution = self._qp.solve(state, vdot_cmd, target.force, target.contact)
         self._fallback_ticks += not solution.solved
         room = self._drive.room(v_ref, measurement)
@@ -164,6 +165,10 @@ class Controller:
             fallback_ticks=self._fallback_ticks,
             **(self._errors() if self.phase in FOLLOWING and self._phases.time_in_plan > 0 else {}),
         )
+
+    def _accelerations(self, state: Configuration, target: WholeBodyTarget) -> tuple[np.ndarray, np.ndarray]:
+        """Return q̈_cmd and q̇_ref ``(nv,)`` of the tasks."""
+        return command(state, target, self._limbs.joints(target.contact), self._arrangement)
 
     def _rehearse(self) -> None:
         """Stand for two ticks, once without torque to spare, report and begin to fold the legs: all is compiled then."""

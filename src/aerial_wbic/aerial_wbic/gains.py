@@ -39,6 +39,13 @@ class TaskWeights(NamedTuple):
     angular_momentum: float = 1.0  # [1/(N·m)²]
 
 
+class QpSolver(StrEnum):
+    """What solves the quadratic program."""
+
+    OSQP = "osqp"
+    DAQP = "daqp"
+
+
 class EstimatorNoise(NamedTuple):
     """What the estimator assumes about its sources; standard deviations."""
 
@@ -78,6 +85,7 @@ class ControllerGains:
     estimator: EstimatorNoise
     tasks: TaskOrder = TaskOrder.WBC_A
     task_weights: TaskWeights = field(default=TaskWeights())
+    qp_solver: QpSolver = QpSolver.OSQP
 
     def __post_init__(self) -> None:
         for path, value in _numbers(self):
