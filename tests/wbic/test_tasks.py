@@ -14,7 +14,6 @@ from aerial_model.kinematics import Kinematics
 from aerial_model.robot import JOINT_POSITION, JOINT_VELOCITY
 from aerial_wbic.gains import TaskOrder
 from aerial_wbic.hierarchy import Task, prioritized, weighted
-from aerial_wbic.target import BodyTarget, WholeBodyTarget
 from aerial_wbic.tasks import (
     Arrangement,
     Limbs,
@@ -41,35 +40,6 @@ ONE = np.array([False, True, False, False])
 @pytest.fixture
 def limbs(robot):
     return Limbs(robot)
-
-
-@pytest.fixture
-def target_at(robot, gains):
-    """A target that a state meets exactly, for loaded points ``contact``; ``changes`` move its body."""
-
-    def target_at(state, contact, **changes):
-        zero = np.zeros(3)
-        body = {
-            "com": state.com,
-            "com_velocity": state.com_velocity,
-            "com_acceleration": zero,
-            "orientation": state.base_orientation,
-            "angular_velocity": state.R_WB @ state.v[3:6],
-            "angular_acceleration": zero,
-            "gains": gains.follow,
-        }
-        return WholeBodyTarget(
-            body=BodyTarget(**{**body, **changes}),
-            joint_position=state.q[JOINT_POSITION],
-            joint_velocity=state.v[JOINT_VELOCITY],
-            joint_acceleration=np.zeros(robot.n_joints),
-            angular_momentum=state.angular_momentum,
-            angular_momentum_rate=zero,
-            force=np.zeros((robot.n_contacts, 3)),
-            contact=contact,
-        )
-
-    return target_at
 
 
 @pytest.fixture
