@@ -1,5 +1,6 @@
 import argparse
 from dataclasses import dataclass
+from enum import StrEnum
 
 import pytest
 
@@ -16,9 +17,15 @@ class Inner:
     large: float = 2.0
 
 
+class Order(StrEnum):
+    FIRST = "first"
+    LAST = "last"
+
+
 @dataclass(frozen=True, kw_only=True)
 class Section:
     number: float = 0.0
+    order: Order = Order.FIRST
     inner: Inner = Inner()
 
 
@@ -33,6 +40,16 @@ def test_a_value_is_replaced():
 def test_a_nested_value_is_replaced_and_its_neighbours_stay():
     inner = planner_section("planner.inner.small=3", "planner.inner.large=4").inner
     assert (inner.small, inner.large) == (3.0, 4.0)
+
+
+def test_a_choice_is_made_by_its_name():
+    assert planner_section("planner.order=last").order is Order.LAST
+
+
+@pytest.mark.parametrize("text", ["lst", "3", "[last]"])
+def test_what_is_no_choice_is_told_those_there_are(text):
+    with pytest.raises(ConfigurationError, match=r"planner: order: no .*there are first, last"):
+        planner_section(f"planner.order={text}")
 
 
 def test_the_robot_it_came_from_is_unchanged():

@@ -9,8 +9,9 @@ import pytest
 from aerial_model import rotation
 from aerial_model.kinematics import Kinematics
 from aerial_model.plan import Plan
-from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, JOINT_POSITION, Robot
+from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, JOINT_POSITION, JOINT_VELOCITY, Robot
 from aerial_wbic.gains import ControllerGains
+from aerial_wbic.target import BodyTarget, WholeBodyTarget
 
 GRAVITY = 9.81  # [m/s²]
 DT = 0.01  # between knots [s]
@@ -45,6 +46,35 @@ def state_at(robot: Robot):
         return kinematics.at(q, v)
 
     return state_at
+
+
+@pytest.fixture
+def target_at(robot, gains):
+    """A target that a state meets exactly, for loaded points ``contact``; ``changes`` move its body."""
+
+    def target_at(state, contact, **changes):
+        zero = np.zeros(3)
+        body = {
+            "com": state.com,
+            "com_velocity": state.com_velocity,
+            "com_acceleration": zero,
+            "orientation": state.base_orientation,
+            "angular_velocity": state.R_WB @ state.v[3:6],
+            "angular_acceleration": zero,
+            "gains": gains.follow,
+        }
+        return WholeBodyTarget(
+            body=BodyTarget(**{**body, **changes}),
+            joint_position=state.q[JOINT_POSITION],
+            joint_velocity=state.v[JOINT_VELOCITY],
+            joint_acceleration=np.zeros(robot.n_joints),
+            angular_momentum=state.angular_momentum,
+            angular_momentum_rate=zero,
+            force=np.zeros((robot.n_contacts, 3)),
+            contact=contact,
+        )
+
+    return target_at
 
 
 @pytest.fixture(scope="session")

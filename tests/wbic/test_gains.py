@@ -47,3 +47,10 @@ def test_a_missing_section_is_named(robot):
     bare = dataclasses.replace(robot, sections={})
     with pytest.raises(ConfigurationError, match="controller: key 'follow' is missing"):
         Controller(bare)
+
+
+def test_a_choice_is_named_with_all_there_are(robot):
+    with pytest.raises(
+        ConfigurationError, match=r"tasks: no 'wbc_d' \(did you mean '.*'\?\); there are wbc_a, wbc_b, wbc_c, weighted"
+    ):
+        Controller(robot.with_section("controller", tasks="wbc_d"))

@@ -11,12 +11,15 @@ from scipy.optimize import nnls
 
 from aerial_model.contact import friction_pyramid
 from aerial_model.robot import BASE_TWIST
+from aerial_wbic.gains import QpSolver
 from aerial_wbic.qp import ForceOptimization, Room, Solution, inverse_dynamics
 from aerial_wbic.target import shared_load
 
 EQUATION_TOLERANCE = 1e-8  # [N], [N·m]
 FORCE_TOLERANCE = 0.1  # that a force may leave the pyramid [N]
 GRADIENT_TOLERANCE = 0.03  # of the cost's gradient, relative to its largest part
+KKT_TOLERANCE = 1e-7  # of the independent optimum, relative to the cost's gradient
+OPTIMUM_TOLERANCE = 0.01  # between the solver's forces and the independent ones, relative to the largest
 ROOM_TOLERANCE = 0.5  # by which a torque may leave its room [N·m], or a force the pyramid on that account [N]
 ACTIVE = 0.3  # slack below which a face of the pyramid is taken to bear [N]
 
@@ -24,9 +27,9 @@ contacts = st.lists(st.booleans(), min_size=4, max_size=4).map(np.array)
 any_state = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=40, deadline=None)
 
 
-@pytest.fixture
-def optimization(robot, gains):
-    return ForceOptimization(robot, gains.weight_base, gains.weight_force)
+@pytest.fixture(params=QpSolver)
+def optimization(robot, gains, request):
+    return ForceOptimization(robot, gains.weight_base, gains.weight_force, request.param)
 
 
 def problem(state, seed):
@@ -79,6 +82,46 @@ def test_no_other_forces_cost_less(optimization, robot, gains, state_at, seed, c
     assert left < GRADIENT_TOLERANCE * (1 + max(np.abs(part).max() for part in parts))
 
 
+def condensed(robot, gains, state, vdot_cmd, f_cmd, contact):
+    """The program (3.24) in the loaded forces x alone, min ½ xᵀ H x + gᵀ x s.t. W x ≥ 0, from its formulas."""
+    H_bb = state.M[BASE_TWIST, BASE_TWIST]
+    lift = np.linalg.solve(H_bb, state.J_contacts[contact, :, BASE_TWIST].reshape(-1, 6).T)
+    missing = -np.linalg.solve(H_bb, (state.M @ vdot_cmd + state.nle)[BASE_TWIST])
+    planned = f_cmd[contact].ravel()
+    H = gains.weight_base * lift.T @ lift + gains.weight_force * np.eye(len(planned))
+    g = gains.weight_base * lift.T @ missing - gains.weight_force * planned
+    return H, g, np.kron(np.eye(contact.sum()), friction_pyramid(robot.friction_coefficient))
+
+
+def by_least_distance(H, g, W):
+    """The minimum and the multipliers of its constraints, by Lawson and Hanson's least distance programming."""
+    L = np.linalg.cholesky(H)
+    A, b = np.linalg.solve(L, W.T).T, W @ np.linalg.solve(H, g)  # z = Lᵀ x + L⁻¹ g:  min ‖z‖  s.t.  A z ≥ b
+    scale = max(1.0, np.abs(b).max())
+    u, _ = nnls(np.vstack([A.T, b / scale]), np.append(np.zeros(len(H)), 1.0))
+    left = 1.0 - b @ u / scale
+    z, multipliers = scale * A.T @ u / left, scale * u / left
+    return np.linalg.solve(L.T, z - np.linalg.solve(L, g)), multipliers
+
+
+@any_state
+@given(seed=st.integers(0, 10**6), contact=contacts.filter(np.any))
+def test_the_optimum_is_that_of_another_method_and_meets_the_kkt_conditions(
+    optimization, robot, gains, state_at, seed, contact
+):
+    state = state_at(seed)
+    vdot_cmd, f_cmd = problem(state, seed)
+    H, g, W = condensed(robot, gains, state, vdot_cmd, f_cmd, contact)
+    best, multipliers = by_least_distance(H, g, W)
+    size = 1 + np.abs(H @ best).max()
+    np.testing.assert_allclose(H @ best + g, W.T @ multipliers, atol=KKT_TOLERANCE * size)  # stationary
+    assert (W @ best).min() > -KKT_TOLERANCE * size  # primal feasible
+    assert multipliers.min() >= 0.0  # dual feasible
+    np.testing.assert_allclose(multipliers * (W @ best), 0.0, atol=KKT_TOLERANCE * size**2)  # complementary
+    found = optimization.solve(state, vdot_cmd, f_cmd, contact).force[contact].ravel()
+    np.testing.assert_allclose(found, best, atol=OPTIMUM_TOLERANCE * (1 + np.abs(best).max()))
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_in_flight_the_base_falls_as_it_must(optimization, robot, state_at, seed):
     state = state_at(seed)
@@ -95,9 +138,10 @@ def test_commanded_forces_that_fit_are_taken(optimization, state_at):
     np.testing.assert_allclose(solution.force, load, atol=0.05)
 
 
-def test_equal_input_gives_equal_output(robot, gains, state_at):
+@pytest.mark.parametrize("solver", QpSolver)
+def test_equal_input_gives_equal_output(robot, gains, state_at, solver):
     def run() -> list[Solution]:
-        optimization = ForceOptimization(robot, gains.weight_base, gains.weight_force)
+        optimization = ForceOptimization(robot, gains.weight_base, gains.weight_force, solver)
         states = [(state_at(seed), seed) for seed in range(5)]
         return [optimization.solve(state, *problem(state, seed), np.ones(4, dtype=bool)) for state, seed in states]
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
+
+import numba
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -9,15 +12,19 @@ import pytest
 from aerial_model import rotation
 from aerial_model.kinematics import Kinematics
 from aerial_model.robot import JOINT_POSITION, JOINT_VELOCITY
-from aerial_wbic.hierarchy import prioritized
-from aerial_wbic.target import BodyTarget, WholeBodyTarget
+from aerial_wbic.gains import TaskOrder
+from aerial_wbic.hierarchy import Task, prioritized, weighted
 from aerial_wbic.tasks import (
+    Arrangement,
     Limbs,
     angular_momentum_task,
+    arranged_tasks,
     attitude_error,
     base_task,
+    command,
     limb_task,
-    prioritized_tasks,
+    momentum_task,
+    posture_task,
 )
 
 STEP = 1e-5  # of finite differences [s]
@@ -36,41 +43,11 @@ def limbs(robot):
 
 
 @pytest.fixture
-def target_at(robot, gains):
-    """A target that a state meets exactly, for loaded points ``contact``; ``changes`` move its body."""
-
-    def target_at(state, contact, **changes):
-        zero = np.zeros(3)
-        body = {
-            "com": state.com,
-            "com_velocity": state.com_velocity,
-            "com_acceleration": zero,
-            "orientation": state.base_orientation,
-            "angular_velocity": state.R_WB @ state.v[3:6],
-            "angular_acceleration": zero,
-            "gains": gains.follow,
-        }
-        return WholeBodyTarget(
-            body=BodyTarget(**{**body, **changes}),
-            joint_position=state.q[JOINT_POSITION],
-            joint_velocity=state.v[JOINT_VELOCITY],
-            joint_acceleration=np.zeros(robot.n_joints),
-            angular_momentum=state.angular_momentum,
-            angular_momentum_rate=zero,
-            force=np.zeros((robot.n_contacts, 3)),
-            contact=contact,
-        )
-
-    return target_at
-
-
-@pytest.fixture
 def tasks_of(limbs, gains):
     """The controller's tasks for a target."""
 
     def tasks_of(state, target):
-        swinging = limbs.swinging(target.contact)
-        return prioritized_tasks(state, target, swinging, gains.swing_joint, gains.angular_momentum_damping)
+        return arranged_tasks(state, target, limbs.joints(target.contact), Arrangement.of(gains))
 
     return tasks_of
 
@@ -85,7 +62,7 @@ def after(robot, state, vdot):
 @pytest.mark.parametrize("seed", range(5))
 def test_loaded_points_do_not_accelerate(robot, limbs, gains, state_at, target_at, seed):
     state = state_at(seed)
-    task = limb_task(state, target_at(state, ALL), limbs.swinging(ALL), gains.swing_joint)
+    task = limb_task(state, target_at(state, ALL), limbs.joints(ALL).swinging, gains.swing_joint)
     vdot, _ = prioritized(state.M_inv, (task,))
     later = after(robot, state, vdot)
     change = later.contact_velocities - state.contact_velocities
@@ -134,10 +111,10 @@ def test_attitude_error_turns_the_base_to_where_it_should_be():
 
 
 def test_a_limb_swings_when_its_point_is_in_the_air(robot, limbs):
-    swinging = [robot.joint_names[j] for j in limbs.swinging(~ONE)]
+    swinging = [robot.joint_names[j] for j in limbs.joints(~ONE).swinging]
     assert swinging == ["fl_abad", "fl_hip", "fl_knee"]
-    assert list(limbs.swinging(NONE)) == list(range(robot.n_joints))
-    assert not len(limbs.swinging(ALL))
+    assert list(limbs.joints(NONE).swinging) == list(range(robot.n_joints))
+    assert not len(limbs.joints(ALL).swinging)
 
 
 @pytest.mark.parametrize("contact", [ALL, ONE, NONE, ~ONE], ids=["four", "one", "no", "three"])
@@ -157,7 +134,7 @@ def test_reference_velocity_keeps_loaded_points_still_and_swings_the_others(
     state = state_at(seed)
     target = target_at(state, contact)
     _, v_ref = prioritized(state.M_inv, tasks_of(state, target))
-    swinging = limbs.swinging(contact)
+    swinging = limbs.joints(contact).swinging
     np.testing.assert_allclose(state.J_contacts[contact] @ v_ref, 0.0, atol=ROUNDING)
     np.testing.assert_allclose(v_ref[JOINT_VELOCITY][swinging], target.joint_velocity[swinging], atol=ROUNDING)
 
@@ -171,3 +148,65 @@ def test_straight_legs_do_not_blow_up(robot, target_at, tasks_of, knee):
     vdot, _ = prioritized(state.M_inv, tasks_of(state, sunk))
     np.testing.assert_allclose(state.J_contacts @ vdot, 0.0, atol=ROUNDING)
     assert np.abs(vdot).max() < ACCELERATION_MAX
+
+
+# --- the arrangements ------------------------------------------------------------------------------------------------
+
+
+def arranged(gains, order):
+    return Arrangement.of(dataclasses.replace(gains, tasks=order))
+
+
+@pytest.mark.parametrize("contact", [ALL, ONE, NONE, ~ONE], ids=["four", "one", "no", "three"])
+@pytest.mark.parametrize("order", TaskOrder)
+def test_in_any_arrangement_a_robot_on_its_target_stays_there(state_at, target_at, limbs, gains, order, contact):
+    state = state_at(moving=False)
+    vdot, v_ref = command(state, target_at(state, contact), limbs.joints(contact), arranged(gains, order))
+    np.testing.assert_allclose(vdot, 0.0, atol=ROUNDING)
+    np.testing.assert_allclose(v_ref, 0.0, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("order", [TaskOrder.WBC_A, TaskOrder.WBC_B, TaskOrder.WBC_C])
+@pytest.mark.parametrize("contact", [ALL, ONE, NONE, ~ONE], ids=["four", "one", "no", "three"])
+def test_strict_arrangements_never_give_up_the_limbs(state_at, target_at, limbs, gains, order, contact):
+    state = state_at(3)
+    target = target_at(state, contact, com_acceleration=np.array([5.0, -5.0, 20.0]), com=state.com + 0.05)
+    joints, arrangement = limbs.joints(contact), arranged(gains, order)
+    first = arranged_tasks(state, target, joints, arrangement)[0]
+    vdot, _ = command(state, target, joints, arrangement)
+    np.testing.assert_allclose(first.J @ vdot, first.a, atol=ROUNDING * max(1.0, np.abs(vdot).max()))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_momentum_task_says_what_the_centre_of_mass_and_the_angular_momentum_tasks_say(
+    state_at, target_at, gains, seed
+):
+    state = state_at(seed)
+    target = target_at(state, ALL, com=state.com + 0.02, orientation=rotation.exp(np.array([0.2, 0.0, 0.0])))
+    momentum = momentum_task(state, target, gains.angular_momentum_damping)
+    angular = angular_momentum_task(state, target, gains.angular_momentum_damping)
+    base = base_task(state, target.body)
+    for whole, upper, lower in zip(momentum, angular, base, strict=True):
+        np.testing.assert_array_equal(whole[:3], upper)
+        np.testing.assert_array_equal(whole[3:], lower[3:])
+
+
+def test_without_arms_a_posture_is_asked_of_what_does_not_swing(robot, state_at, target_at, limbs, gains):
+    posed = limbs.joints(ONE).posed
+    assert [robot.joint_names[j] for j in posed] == ["fl_abad", "fl_hip", "fl_knee"]
+    state = state_at(1)
+    task = posture_task(state, target_at(state, ONE), posed, gains.swing_joint)
+    np.testing.assert_array_equal(task.J @ state.v, state.v[JOINT_VELOCITY][posed])
+    np.testing.assert_allclose(task.a, 0.0, atol=ROUNDING)
+
+
+def test_weighted_tasks_share_what_they_disagree_on():
+    J = np.array([[1.0, 0.0]])
+    tasks = (Task(J, np.array([0.0]), np.array([3.0])), Task(J, np.array([4.0]), np.array([3.0])))
+    vdot, v_ref = weighted(1e-6 * np.eye(2), tasks, np.array([1.0, 3.0]))
+    np.testing.assert_allclose(vdot, [3.0, 0.0], atol=ROUNDING)
+    np.testing.assert_allclose(v_ref, [3.0, 0.0], atol=ROUNDING)
+
+
+def test_all_arrangements_share_one_compiled_tick(gains):
+    assert len({numba.typeof(arranged(gains, order)) for order in TaskOrder}) == 1

@@ -9,6 +9,7 @@ import dataclasses
 import difflib
 import types
 from collections.abc import Iterable, Mapping
+from enum import StrEnum
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
@@ -65,7 +66,7 @@ def from_mapping(cls: type[T], mapping: Any, where: str) -> T:
     """Build a (nested) frozen dataclass or named tuple from a YAML mapping.
 
     Fields without a default are required. Numbers become ``float``/``int``, lists of numbers become read-only arrays,
-    mappings become the class the field is annotated with.
+    names become members of a ``StrEnum``, mappings become the class the field is annotated with.
 
     Args:
         cls: the dataclass or named tuple.
@@ -103,6 +104,8 @@ def _convert(kind: Any, value: Any, where: str) -> Any:
         kind = next(member for member in get_args(kind) if member is not types.NoneType)
     if isinstance(kind, type) and (dataclasses.is_dataclass(kind) or hasattr(kind, "_fields")):
         return from_mapping(kind, value, where)
+    if isinstance(kind, type) and issubclass(kind, StrEnum):
+        return _choice(kind, value, where)
     if kind is np.ndarray:
         return frozen_array(value, where)
     if get_origin(kind) is tuple:
@@ -116,6 +119,14 @@ def _convert(kind: Any, value: Any, where: str) -> Any:
     if kind in (str, bool) and not isinstance(value, kind):
         raise ConfigurationError(f"{where}: expected {kind.__name__}, found {value!r}")
     return tuple(value) if isinstance(value, list) else value
+
+
+def _choice(kind: type[StrEnum], value: Any, where: str) -> StrEnum:
+    """Return the member of that name."""
+    known = [str(member) for member in kind]
+    if value not in known:
+        raise ConfigurationError(f"{where}: no '{value}'{closest(str(value), known)}; there are {', '.join(known)}")
+    return kind(value)
 
 
 def _converted_tuple(kinds: tuple[Any, ...], value: Any, where: str) -> tuple[Any, ...]:

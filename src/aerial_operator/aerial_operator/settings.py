@@ -1,4 +1,4 @@
-"""``--set SECTION.KEY=VALUE``: a robot with some numbers of its ``robot.yaml`` replaced."""
+"""``--set SECTION.KEY=VALUE``: a robot with some numbers and choices of its ``robot.yaml`` replaced."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def add_setting_argument(parser: argparse.ArgumentParser) -> None:
         type=setting,
         action="append",
         default=[],
-        help="replace a number of robot.yaml: planner.…, controller.… or sensors.…; may be given again",
+        help="replace a number or choice of robot.yaml: planner.…, controller.… or sensors.…; may be given again",
     )
 
 

@@ -25,7 +25,7 @@ from aerial_wbic.gains import ControllerGains
 from aerial_wbic.phase import FOLLOWING, Phase, Phases
 from aerial_wbic.qp import ForceOptimization, Room
 from aerial_wbic.target import GRAVITY, Fold, PostureTarget, WholeBodyTarget
-from aerial_wbic.tasks import Limbs, attitude_error, command
+from aerial_wbic.tasks import Arrangement, Limbs, attitude_error, command
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,8 +58,10 @@ class Controller:
         self.robot = robot
         self._gains = robot.section("controller", ControllerGains)
         self._limbs = Limbs(robot)
+        self._arrangement = Arrangement.of(self._gains)
         self._kinematics = Kinematics(robot)
-        self._qp = ForceOptimization(robot, self._gains.weight_base, self._gains.weight_force)
+        gains = self._gains
+        self._qp = ForceOptimization(robot, gains.weight_base, gains.weight_force, gains.qp_solver)
         self._estimator = Estimator(robot, self._gains.estimator)
         self._home_height = _home_height(robot, self._kinematics)
         self.reset()
@@ -87,8 +89,7 @@ class Controller:
         self._now = (state, target)
         if not isinstance(target, WholeBodyTarget):
             return self._drive.resting(target, measurement)
-        gains, swinging = self._gains, self._limbs.swinging(target.contact)
-        vdot_cmd, v_ref = command(state, target, swinging, gains.swing_joint, gains.angular_momentum_damping)
+        vdot_cmd, v_ref = self._accelerations(state, target)
         solution = self._qp.solve(state, vdot_cmd, target.force, target.contact)
         self._fallback_ticks += not solution.solved
         room = self._drive.room(v_ref, measurement)
@@ -164,6 +165,10 @@ class Controller:
             fallback_ticks=self._fallback_ticks,
             **(self._errors() if self.phase in FOLLOWING and self._phases.time_in_plan > 0 else {}),
         )
+
+    def _accelerations(self, state: Configuration, target: WholeBodyTarget) -> tuple[np.ndarray, np.ndarray]:
+        """Return q̈_cmd and q̇_ref ``(nv,)`` of the tasks."""
+        return command(state, target, self._limbs.joints(target.contact), self._arrangement)
 
     def _rehearse(self) -> None:
         """Stand for two ticks, once without torque to spare, report and begin to fold the legs: all is compiled then."""

@@ -1,9 +1,10 @@
-"""Every number the controller is tuned by, section ``controller`` of ``robot.yaml``; one set for all motions."""
+"""Every number and choice the controller is tuned by, section ``controller`` of ``robot.yaml``; one set for all motions."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
+from enum import StrEnum
 from typing import Any, NamedTuple
 
 
@@ -21,6 +22,30 @@ class BodyGains(NamedTuple):
     attitude: Feedback
 
 
+class TaskOrder(StrEnum):
+    """Which tasks the accelerations come from: in strict priority, or all at once with weights."""
+
+    WBC_A = "wbc_a"  # limbs, base, angular momentum
+    WBC_B = "wbc_b"  # limbs, momentum
+    WBC_C = "wbc_c"  # limbs, base, joint positions
+    WEIGHTED = "weighted"  # those of WBC_A, in one least-squares problem
+
+
+class TaskWeights(NamedTuple):
+    """Weights of ``TaskOrder.WEIGHTED``, per squared unit of each task's acceleration."""
+
+    limbs: float = 1e4  # [1/(m/s²)²], [1/(rad/s²)²]
+    base: float = 100.0  # [1/(m/s²)²], [1/(rad/s²)²]
+    angular_momentum: float = 1.0  # [1/(N·m)²]
+
+
+class QpSolver(StrEnum):
+    """What solves the quadratic program."""
+
+    OSQP = "osqp"
+    DAQP = "daqp"
+
+
 class EstimatorNoise(NamedTuple):
     """What the estimator assumes about its sources; standard deviations."""
 
@@ -35,7 +60,7 @@ class EstimatorNoise(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class ControllerGains:
-    """Gains, weights, durations and thresholds."""
+    """Gains, weights, durations, thresholds and choices."""
 
     follow: BodyGains  # while a plan runs
     hold: BodyGains  # landing and standing
@@ -58,6 +83,9 @@ class ControllerGains:
     start_tilt_tolerance: float  # between a plan's first base attitude and the estimated one [rad]
     start_speed_tolerance: float  # of the centre of mass when a plan is accepted [m/s]
     estimator: EstimatorNoise
+    tasks: TaskOrder = TaskOrder.WBC_A
+    task_weights: TaskWeights = field(default=TaskWeights())
+    qp_solver: QpSolver = QpSolver.OSQP
 
     def __post_init__(self) -> None:
         for path, value in _numbers(self):
@@ -76,5 +104,5 @@ def _numbers(section: Any) -> Iterator[tuple[str, float]]:
         value = getattr(section, name)
         if isinstance(value, float):
             yield name, value
-        else:
+        elif not isinstance(value, StrEnum):
             yield from ((f"{name}.{path}", number) for path, number in _numbers(value))

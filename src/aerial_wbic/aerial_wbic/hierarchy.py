@@ -1,5 +1,7 @@
 """Tasks in strict priority: the acceleration that meets the first task, then as much of the next as is left, and so on.
 
+Next to it, for comparison, all tasks at once with weights.
+
 Null-space projection with dynamically consistent inverses, thesis (3.20)–(3.23). What is left of a task under those above
 it may have any rank, zero included. Two absolute thresholds tell what it is: a relative one would take the rounding noise
 of an exhausted J N for a task and make accelerations of 1e13.
@@ -18,6 +20,7 @@ MOVABLE = (
     1e-3  # a direction below this belongs to its task but is not accelerated: what would move a tonne is not tried
 )
 NOISE = 1e-9  # a direction below this is left to lower tasks
+EFFORT = 1e-3  # ε of weighted tasks [1/kg]: settles what none of them asks for, and hardly weighs on what they do
 
 
 class Task(NamedTuple):
@@ -55,6 +58,28 @@ def prioritized(M_inv: np.ndarray, tasks: tuple[Task, ...]) -> tuple[np.ndarray,
             free -= rank
             N -= J_bar_owned @ J_pre
     return command[:, 0].copy(), command[:, 1].copy()
+
+
+@compiled
+def weighted(M: np.ndarray, tasks: tuple[Task, ...], weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return q̈_cmd and q̇_ref ``(nv,)`` of tasks that compete: min Σ w_i ‖J_i q̈ − a_i‖² + ε q̈ᵀ H q̈, the same for q̇_ref.
+
+    Args:
+        M: H ``(nv, nv)``.
+        tasks: a task of no rows is allowed.
+        weights: w_i, one a task.
+    """
+    A = EFFORT * M
+    b = np.zeros((len(M), 2))  # columns q̈_cmd, q̇_ref
+    for i, task in enumerate(tasks):
+        Jt = weights[i] * task.J.T
+        A += Jt @ task.J
+        b[:, 0] += Jt @ task.a
+        b[:, 1] += Jt @ task.xdot
+    L = np.empty_like(A)
+    cholesky(A, L)
+    cholesky_solve(L, b)
+    return b[:, 0].copy(), b[:, 1].copy()
 
 
 @compiled

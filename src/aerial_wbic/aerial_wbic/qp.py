@@ -6,13 +6,15 @@
 OSQP is set up once for every number of loaded points; the sparsity never changes, a tick updates numbers and starts
 from the last solution. Its penalty does not adapt to what it met before, so that equal input gives equal output to the
 last bit. A fixed penalty converges only on a well scaled problem: the variables are √Q_1 δ_q and √Q_2 δ_f, and the rows of the equations of motion
-are multiplied by √Q_1 H_bb⁻¹, so that cost and equality are both of unit size.
+are multiplied by √Q_1 H_bb⁻¹, so that cost and equality are both of unit size. DAQP, the other solver there is, gets the
+same problem without δ_q: the equations of motion give it from δ_f.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
+import daqp
 import numpy as np
 import osqp
 from scipy import sparse
@@ -21,6 +23,7 @@ from aerial_model.contact import friction_pyramid
 from aerial_model.kinematics import Configuration
 from aerial_model.robot import BASE_TWIST, JOINT_VELOCITY, Robot
 from aerial_wbic.compiled import cholesky, cholesky_solve, compiled
+from aerial_wbic.gains import QpSolver
 
 _N_BASE = 6
 _LEVER = 0.2  # [m] by which torques are divided, so that their rows are as large as those of forces
@@ -40,6 +43,7 @@ _SETTINGS = {
 # median and over 70 in 1 % of a jump's ticks, the second solves what is far from what the ground can give.
 _USUAL = {"rho": 6.0, "max_iter": 150}
 _HARD = {"rho": 100.0, "max_iter": 2500}  # up to 1 ms
+_DAQP_SOLVED = 1
 _ACCEPTED = (osqp.SolverStatus.OSQP_SOLVED, osqp.SolverStatus.OSQP_SOLVED_INACCURATE)
 
 
@@ -65,19 +69,20 @@ class ForceOptimization:
         robot: gives the number of contacts and the friction coefficient.
         weight_base: Q_1, the same for all six rows.
         weight_force: Q_2, the same for all forces.
+        solver: that finds the optimum.
     """
 
-    def __init__(self, robot: Robot, weight_base: float, weight_force: float) -> None:
+    def __init__(self, robot: Robot, weight_base: float, weight_force: float, solver: QpSolver = QpSolver.OSQP) -> None:
         pyramid = friction_pyramid(robot.friction_coefficient)
         numbers = range(1, robot.n_contacts + 1)
-        self._programs = [_Program(n, 0, pyramid, weight_base, weight_force) for n in numbers]
-        self._limited = [_Program(n, robot.n_joints, pyramid, weight_base, weight_force) for n in numbers]
+        self._programs = [_Program(n, 0, pyramid, weight_base, weight_force, solver) for n in numbers]
+        self._limited = [_Program(n, robot.n_joints, pyramid, weight_base, weight_force, solver) for n in numbers]
         self._friction = float(pyramid[0, 2])
 
     def solve(self, state: Configuration, vdot_cmd: np.ndarray, f_cmd: np.ndarray, contact: np.ndarray) -> Solution:
         """Return the forces and the acceleration of (3.24).
 
-        When OSQP fails, the one fallback is: the commanded forces, moved into the friction pyramid.
+        When the solver fails, the one fallback is: the commanded forces, moved into the friction pyramid.
 
         Args:
             state: of the robot.
@@ -118,12 +123,14 @@ _NO_FORCE = np.zeros(0)
 
 
 class _Program:
-    """OSQP for ``n`` loaded points and the limits of ``n_limits`` joints, all of them or none.
+    """The problem of ``n`` loaded points and the limits of ``n_limits`` joints, all of them or none.
 
     Variables: [√Q_1 δ_q (6); √Q_2 δ_f (3 n)]; rows: [equations of motion (6); pyramids (5 n); torques (n_limits)].
     """
 
-    def __init__(self, n: int, n_limits: int, pyramid: np.ndarray, weight_base: float, weight_force: float) -> None:
+    def __init__(
+        self, n: int, n_limits: int, pyramid: np.ndarray, weight_base: float, weight_force: float, solver: QpSolver
+    ) -> None:
         self._pyramid = pyramid
         self._root_base, self._root_force = float(np.sqrt(weight_base)), float(np.sqrt(weight_force))
         variables, limits = _N_BASE + 3 * n, _N_BASE + len(pyramid) * n
@@ -140,17 +147,7 @@ class _Program:
         self._limits = np.flatnonzero(self._A.indices >= limits).reshape(variables, n_limits)  # by column
         self._lower = np.zeros(rows)
         self._upper = np.full(rows, _INFINITY)
-        self._solver = osqp.OSQP()
-        self._solver.setup(
-            sparse.eye(variables, format="csc"),
-            np.zeros(variables),
-            self._A,
-            self._lower,
-            self._upper,
-            **_SETTINGS,
-            **_USUAL,
-        )
-        self._core = self._solver._solver  # OSQP itself: the wrapper's bookkeeping takes longer than the solution
+        self._solver = _SOLVERS[solver](self._A, self._lower, self._upper)
 
     def solve(
         self,
@@ -168,25 +165,95 @@ class _Program:
         )
         if room is not None:
             _state_limits(state, vdot_cmd, f_cmd, contact, room, root_base, root_force, self._limits, A, lower, upper)
+        x = self._solver.minimum(self._A, lower, upper)
+        return None if x is None else x / root_force
+
+
+class _Osqp:
+    """OSQP, set up once for all problems of one sparsity."""
+
+    def __init__(self, A: sparse.csc_matrix, lower: np.ndarray, upper: np.ndarray) -> None:
+        rows, variables = A.shape
+        self._nothing = np.zeros(variables), np.zeros(rows)
+        self._solver = osqp.OSQP()
+        P = sparse.eye(variables, format="csc")
+        self._solver.setup(P, self._nothing[0], A, lower, upper, **_SETTINGS, **_USUAL)
+        self._core = self._solver._solver  # OSQP itself: the wrapper's bookkeeping takes longer than the solution
+
+    def minimum(self, A: sparse.csc_matrix, lower: np.ndarray, upper: np.ndarray) -> np.ndarray | None:
+        """Return √Q_2 δ_f; None if OSQP gives up also with the second penalty."""
         self._core.update_data_vec(q=None, l=lower, u=upper)
-        self._core.update_data_mat(P_x=None, P_i=None, A_x=A, A_i=None)
-        x = self._minimum()
+        self._core.update_data_mat(P_x=None, P_i=None, A_x=A.data, A_i=None)
+        x = self._attempt()
         if x is None:
             self._solver.update_settings(**_HARD)
-            x = self._minimum()
+            x = self._attempt()
             self._solver.update_settings(**_USUAL)
         if x is None:
-            self._solver.warm_start(x=np.zeros(self._A.shape[1]), y=np.zeros(self._A.shape[0]))
+            x, y = self._nothing
+            self._solver.warm_start(x=x, y=y)
             return None
-        return x[_N_BASE:] / self._root_force
+        return x[_N_BASE:]
 
-    def _minimum(self) -> np.ndarray | None:
+    def _attempt(self) -> np.ndarray | None:
         """Return the variables that OSQP finds; None if it gives up."""
         self._core.solve()
         if self._core.info.status_val not in _ACCEPTED:
             return None
         x = self._core.solution.x
         return x if np.isfinite(x).all() else None
+
+
+class _Daqp:
+    """DAQP, an active-set method, on the problem of the forces alone; every problem from nothing."""
+
+    def __init__(self, A: sparse.csc_matrix, lower: np.ndarray, upper: np.ndarray) -> None:
+        self._sense = np.zeros(len(lower) - _N_BASE, dtype=np.int32)  # inequalities
+
+    def minimum(self, A: sparse.csc_matrix, lower: np.ndarray, upper: np.ndarray) -> np.ndarray | None:
+        """Return √Q_2 δ_f; None if DAQP finds none, or the problem is not finite."""
+        problem = reduced(A.data, A.indices, A.indptr, lower, upper)
+        if not np.isfinite(problem.f).all():  # it would not end
+            return None
+        x, _, status, _ = daqp.solve(*problem, self._sense)
+        return x if status == _DAQP_SOLVED and np.isfinite(x).all() else None
+
+
+_SOLVERS = {QpSolver.OSQP: _Osqp, QpSolver.DAQP: _Daqp}
+
+
+class Reduced(NamedTuple):
+    """min ½ xᵀ H x + fᵀ x  s.t. lower ≤ A x ≤ upper, in the order in which DAQP takes it."""
+
+    H: np.ndarray  # (3 n, 3 n)
+    f: np.ndarray  # (3 n,)
+    A: np.ndarray  # (m, 3 n)
+    upper: np.ndarray  # (m,)
+    lower: np.ndarray  # (m,)
+
+
+@compiled
+def reduced(data: np.ndarray, indices: np.ndarray, indptr: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> Reduced:
+    """Return the problem of x = √Q_2 δ_f; the first six rows of A say y = √Q_1 δ_q = G x + g.
+
+    Args:
+        data: entries of A by columns.
+        indices: their rows.
+        indptr: where each column begins, and the end.
+        lower: least values of A's rows; the first six are equations.
+        upper: greatest values.
+    """
+    rows, n = len(lower), len(indptr) - 1
+    dense = np.zeros((rows, n))
+    for column in range(n):
+        for entry in range(indptr[column], indptr[column + 1]):
+            dense[indices[entry], column] = data[entry]
+    G = -dense[:_N_BASE, _N_BASE:].copy()
+    g = lower[:_N_BASE].copy()
+    A_y, A_x = dense[_N_BASE:, :_N_BASE].copy(), dense[_N_BASE:, _N_BASE:].copy()
+    shift = A_y @ g
+    H = G.T @ G + np.eye(n - _N_BASE)
+    return Reduced(H, G.T @ g, A_x + A_y @ G, upper[_N_BASE:] - shift, lower[_N_BASE:] - shift)
 
 
 @compiled

@@ -157,13 +157,14 @@ def _held(course: _Course, time: float, state: Configuration) -> WholeBodyTarget
         course.gains,
     )
     n = len(state.v) - JOINT_VELOCITY.start
+    inertia = state.A_G[:3, BASE_ANGULAR] @ state.R_WB.T  # of the robot with its joints locked, about W's axes
     return WholeBodyTarget(
         body,
         state.q[JOINT_POSITION],
         np.zeros(n),
         np.zeros(n),
-        state.angular_momentum,
-        np.zeros(3),
+        inertia @ angular_velocity,
+        inertia @ angular_acceleration,
         shared_load(state, acceleration),
         np.ones(len(state.contact_positions), dtype=np.bool_),
     )

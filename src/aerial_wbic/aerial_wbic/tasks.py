@@ -1,4 +1,4 @@
-"""The tasks of the whole-body controller in the order of their priority, thesis (3.26)–(3.29).
+"""The tasks of the whole-body controller, thesis (3.26)–(3.29), and the orders in which they are arranged.
 
 One function per physical statement. The feedback of (3.22), ẍ_cmd = ẍ_des + K_p (x_des − x) + K_d (ẋ_des − ẋ), is that
 of a velocity that also closes the gap: ẍ_cmd = ẍ_des + K_d (ẋ_ref − ẋ) with ẋ_ref = ẋ_des + K_p / K_d (x_des − x).
@@ -6,17 +6,27 @@ of a velocity that also closes the gap: ẍ_cmd = ẍ_des + K_d (ẋ_ref − ẋ
 
 from __future__ import annotations
 
+from enum import IntEnum
+from typing import NamedTuple
+
 import numpy as np
 
 from aerial_model.kinematics import Configuration
 from aerial_model.robot import BASE_ANGULAR, BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY, Robot
 from aerial_wbic.compiled import compiled, inverse_of, log_of, product_of, quaternion
-from aerial_wbic.gains import Feedback
-from aerial_wbic.hierarchy import Task, prioritized
+from aerial_wbic.gains import ControllerGains, Feedback, TaskOrder
+from aerial_wbic.hierarchy import Task, prioritized, weighted
 from aerial_wbic.target import BodyTarget, WholeBodyTarget
 
 ANGULAR = slice(0, 3)  # rows of A_G and of momenta, thesis (2.5)
 LINEAR = slice(3, 6)
+
+
+class Joints(NamedTuple):
+    """Indices of the joints that tasks lead: they depend on which points carry load."""
+
+    swinging: np.ndarray  # (n_s,) of limbs in the air
+    posed: np.ndarray  # (n_p,) that a posture is asked of: arms, or all that do not swing when there are none
 
 
 class Limbs:
@@ -29,49 +39,102 @@ class Limbs:
             for joint in list(model.supports[model.frames[frame].parentJoint])[2:]:  # 0: universe, 1: base
                 chains[i, model.joints[joint].idx_v - JOINT_VELOCITY.start] = True
         self._chains = chains  # (n_c, n)
-        self._swinging: dict[bytes, np.ndarray] = {}  # what was asked before
+        self._joints: dict[bytes, Joints] = {}  # what was asked before
 
-    def swinging(self, contact: np.ndarray) -> np.ndarray:
-        """Return the indices of the swinging joints, given which points ``(n_c,)`` carry load."""
+    def joints(self, contact: np.ndarray) -> Joints:
+        """Return the joints that tasks lead, given which points ``(n_c,)`` carry load."""
         key = contact.tobytes()
-        if key not in self._swinging:
-            loaded = self._chains[contact].any(axis=0)
-            self._swinging[key] = np.flatnonzero(self._chains[~contact].any(axis=0) & ~loaded)
-        return self._swinging[key]
+        if key not in self._joints:
+            swinging = self._chains[~contact].any(axis=0) & ~self._chains[contact].any(axis=0)
+            arms = ~self._chains.any(axis=0)
+            posed = arms if arms.any() else ~swinging
+            self._joints[key] = Joints(np.flatnonzero(swinging), np.flatnonzero(posed))
+        return self._joints[key]
+
+
+class Statement(IntEnum):
+    """What a task can say."""
+
+    NOTHING = 0
+    LIMBS = 1
+    BASE = 2
+    ANGULAR_MOMENTUM = 3
+    MOMENTUM = 4
+    POSTURE = 5
+
+
+class Arrangement(NamedTuple):
+    """Which tasks the accelerations come from. Of all arrangements the type is the same: one compiled tick serves all."""
+
+    order: tuple[int, int, int]  # of Statement, the most important first
+    weights: np.ndarray  # (3,) of the tasks in one least-squares problem, or (0,) for strict priority
+    limbs: Feedback  # gains of joints that are led
+    angular_momentum_damping: float  # [1/s]
+
+    @classmethod
+    def of(cls, gains: ControllerGains) -> Arrangement:
+        """Return what a controller's gains ask for."""
+        weights = gains.task_weights if gains.tasks is TaskOrder.WEIGHTED else ()
+        return cls(
+            tuple(int(statement) for statement in _ORDERS[gains.tasks]),
+            np.array(weights, dtype=float),
+            gains.swing_joint,
+            gains.angular_momentum_damping,
+        )
+
+
+_ORDERS = {
+    TaskOrder.WBC_A: (Statement.LIMBS, Statement.BASE, Statement.ANGULAR_MOMENTUM),
+    TaskOrder.WBC_B: (Statement.LIMBS, Statement.MOMENTUM, Statement.NOTHING),
+    TaskOrder.WBC_C: (Statement.LIMBS, Statement.BASE, Statement.POSTURE),
+    TaskOrder.WEIGHTED: (Statement.LIMBS, Statement.BASE, Statement.ANGULAR_MOMENTUM),
+}
 
 
 @compiled
 def command(
-    state: Configuration,
-    target: WholeBodyTarget,
-    swinging: np.ndarray,
-    swing_gains: Feedback,
-    angular_momentum_damping: float,
+    state: Configuration, target: WholeBodyTarget, joints: Joints, arrangement: Arrangement
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return q̈_cmd and q̇_ref ``(nv,)`` of the controller's tasks; ``swinging`` are the joints of limbs in the air."""
-    tasks = prioritized_tasks(state, target, swinging, swing_gains, angular_momentum_damping)
+    """Return q̈_cmd and q̇_ref ``(nv,)`` of the controller's tasks."""
+    tasks = arranged_tasks(state, target, joints, arrangement)
+    if len(arrangement.weights) > 0:
+        return weighted(state.M, tasks, arrangement.weights)
     return prioritized(state.M_inv, tasks)
 
 
 @compiled
-def prioritized_tasks(
-    state: Configuration,
-    target: WholeBodyTarget,
-    swinging: np.ndarray,
-    swing_gains: Feedback,
-    angular_momentum_damping: float,
+def arranged_tasks(
+    state: Configuration, target: WholeBodyTarget, joints: Joints, arrangement: Arrangement
 ) -> tuple[Task, Task, Task]:
     """Return the controller's tasks at ``state``, most important first."""
+    first, second, third = arrangement.order
     return (
-        limb_task(state, target, swinging, swing_gains),
-        base_task(state, target.body),
-        angular_momentum_task(state, target, angular_momentum_damping),
+        _task(first, state, target, joints, arrangement),
+        _task(second, state, target, joints, arrangement),
+        _task(third, state, target, joints, arrangement),
     )
 
 
 @compiled
+def _task(
+    statement: int, state: Configuration, target: WholeBodyTarget, joints: Joints, arrangement: Arrangement
+) -> Task:
+    if statement == Statement.LIMBS:
+        return limb_task(state, target, joints.swinging, arrangement.limbs)
+    if statement == Statement.BASE:
+        return base_task(state, target.body)
+    if statement == Statement.ANGULAR_MOMENTUM:
+        return angular_momentum_task(state, target, arrangement.angular_momentum_damping)
+    if statement == Statement.MOMENTUM:
+        return momentum_task(state, target, arrangement.angular_momentum_damping)
+    if statement == Statement.POSTURE:
+        return posture_task(state, target, joints.posed, arrangement.limbs)
+    return Task(np.zeros((0, len(state.v))), np.zeros(0), np.zeros(0))
+
+
+@compiled
 def limb_task(state: Configuration, target: WholeBodyTarget, swinging: np.ndarray, feedback: Feedback) -> Task:
-    """Task 0, (3.26): loaded contact points do not accelerate, limbs in the air follow their course.
+    """(3.26), the first of all: loaded contact points do not accelerate, limbs in the air follow their course.
 
     A swinging limb is led in joint space, relative to the base: in the air its end effector follows from the joints
     without a singularity, and the base, which nothing can steer there, does not pull it off its course.
@@ -85,27 +148,39 @@ def limb_task(state: Configuration, target: WholeBodyTarget, swinging: np.ndarra
             J[row : row + 3] = state.J_contacts[i]
             a[row : row + 3] = -state.Jdot_v_contacts[i]
             row += 3
-    rate = feedback.stiffness / feedback.damping
-    joints = JOINT_VELOCITY.start
-    q_j, dq_j = state.q[JOINT_POSITION], state.v[JOINT_VELOCITY]
-    for j in swinging:
-        J[row, joints + j] = 1.0
-        xdot[row] = target.joint_velocity[j] + rate * (target.joint_position[j] - q_j[j])
-        a[row] = target.joint_acceleration[j] + feedback.damping * (xdot[row] - dq_j[j])
-        row += 1
+    _lead(state, target, swinging, feedback, Task(J[row:], a[row:], xdot[row:]))
     return Task(J, a, xdot)
 
 
 @compiled
-def base_task(state: Configuration, body: BodyTarget) -> Task:
-    """Task 1, (3.27): attitude of the base and position of the body, the latter as its centre of mass.
+def posture_task(state: Configuration, target: WholeBodyTarget, joints: np.ndarray, feedback: Feedback) -> Task:
+    """Return the task that joints are where the plan has them: arms, or the legs as far as they are free."""
+    task = Task(np.zeros((len(joints), len(state.v))), np.zeros(len(joints)), np.zeros(len(joints)))
+    _lead(state, target, joints, feedback, task)
+    return task
 
-    The centre of mass stands for the base position, which follows from it when the limbs are where task 0 puts them:
+
+@compiled
+def _lead(state: Configuration, target: WholeBodyTarget, joints: np.ndarray, feedback: Feedback, rows: Task) -> None:
+    """Write into ``rows`` that joints follow their course."""
+    rate = feedback.stiffness / feedback.damping
+    q_j, dq_j = state.q[JOINT_POSITION], state.v[JOINT_VELOCITY]
+    for row, j in enumerate(joints):
+        rows.J[row, JOINT_VELOCITY.start + j] = 1.0
+        rows.xdot[row] = target.joint_velocity[j] + rate * (target.joint_position[j] - q_j[j])
+        rows.a[row] = target.joint_acceleration[j] + feedback.damping * (rows.xdot[row] - dq_j[j])
+
+
+@compiled
+def base_task(state: Configuration, body: BodyTarget) -> Task:
+    """(3.27): attitude of the base and position of the body, the latter as its centre of mass.
+
+    The centre of mass stands for the base position, which follows from it when the limbs are where their task puts them:
     it is what a ballistic flight and the balance after landing depend on, whatever the limbs' errors.
     """
     J = np.zeros((6, len(state.v)))
     a, xdot = np.empty(6), np.empty(6)
-    attitude, position = body.gains.attitude, body.gains.position
+    attitude = body.gains.attitude
 
     J[ANGULAR, BASE_ANGULAR] = state.R_WB
     turn = attitude_error(body.orientation, state.q[BASE_ORIENTATION])
@@ -113,16 +188,36 @@ def base_task(state: Configuration, body: BodyTarget) -> Task:
     omega = state.R_WB @ state.v[BASE_ANGULAR]
     a[ANGULAR] = body.angular_acceleration + attitude.damping * (xdot[ANGULAR] - omega)
 
-    J[LINEAR] = state.A_G[LINEAR] / state.mass
-    xdot[LINEAR] = body.com_velocity + position.stiffness / position.damping * (body.com - state.com)
-    a[LINEAR] = body.com_acceleration + position.damping * (xdot[LINEAR] - state.com_velocity)
-    a[LINEAR] -= state.Adot_v_G[LINEAR] / state.mass
+    _lead_com(state, body, Task(J, a, xdot))
     return Task(J, a, xdot)
 
 
 @compiled
+def momentum_task(state: Configuration, target: WholeBodyTarget, damping: float) -> Task:
+    """All of the centroidal momentum: the angular part is that of (3.28)–(3.29), the linear part follows the body.
+
+    The linear part feeds the position of the centre of mass back; nothing holds an attitude.
+    """
+    J = np.empty((6, len(state.v)))
+    a, xdot = np.empty(6), np.empty(6)
+    J[ANGULAR], a[ANGULAR], xdot[ANGULAR] = angular_momentum_task(state, target, damping)
+    _lead_com(state, target.body, Task(J, a, xdot))
+    return Task(J, a, xdot)
+
+
+@compiled
+def _lead_com(state: Configuration, body: BodyTarget, task: Task) -> None:
+    """Write into the ``LINEAR`` rows of a task that the centre of mass follows its course."""
+    position = body.gains.position
+    task.J[LINEAR] = state.A_G[LINEAR] / state.mass
+    task.xdot[LINEAR] = body.com_velocity + position.stiffness / position.damping * (body.com - state.com)
+    task.a[LINEAR] = body.com_acceleration + position.damping * (task.xdot[LINEAR] - state.com_velocity)
+    task.a[LINEAR] -= state.Adot_v_G[LINEAR] / state.mass
+
+
+@compiled
 def angular_momentum_task(state: Configuration, target: WholeBodyTarget, damping: float) -> Task:
-    """Task 2, (3.28)–(3.29): α̇_cmd = α̇_des + K_d,CAM (α_des − α), with no position to feed back."""
+    """(3.28)–(3.29): α̇_cmd = α̇_des + K_d,CAM (α_des − α), with no position to feed back."""
     alphadot = target.angular_momentum_rate + damping * (target.angular_momentum - state.angular_momentum)
     return Task(state.A_G[ANGULAR].copy(), alphadot - state.Adot_v_G[ANGULAR], target.angular_momentum.copy())
 
