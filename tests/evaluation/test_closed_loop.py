@@ -6,9 +6,10 @@ import pytest
 from aerial_evaluation.closed_loop import Loop, terrain_in_world
 from aerial_model import rotation
 from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, Robot
-from aerial_model.state import Command
+from aerial_model.state import Command, Estimate
 from aerial_model.terrain import Terrain
 from aerial_sim.simulation import Simulation
+from aerial_wbic.phase import Phase
 
 
 @pytest.fixture(scope="module")
@@ -24,9 +25,17 @@ class Holder:
         self._zero = np.zeros(robot.n_joints)
         self._home = robot.poses["home"]
         self._ticks = 0
+        self.phase = Phase.STAND
 
     def step(self, measurement):
         self._ticks += 1
+        self.estimate = Estimate(
+            time=measurement.time,
+            q=np.concatenate([np.zeros(3), measurement.orientation, measurement.joint_position]),
+            v=np.zeros(6 + len(self._home)),
+            position_variance=1e-6,
+            velocity_variance=1e-4,
+        )
         self.status.fallback_ticks += self._ticks == 3
         gains = {"stiffness": self._zero + 100.0, "damping": self._zero + 2.0}
         return Command(torque=self._zero, position=self._home, velocity=self._zero, **gains)
@@ -45,8 +54,9 @@ def standing(robot):
 def test_a_loop_records_every_tick_and_its_duration(robot):
     loop = Loop(Simulation(robot, noise="off"), Holder(robot))
     loop.advance(0.1)
-    assert len(loop.ticks) == len(loop.tick_times) == 50
+    assert len(loop.ticks) == len(loop.tick_times) == len(loop.beliefs) == 50
     assert loop.ticks[-1].truth.time == pytest.approx(0.1)
+    assert loop.cpu_time > 0
     assert loop.wall_time >= sum(loop.tick_times)
 
 

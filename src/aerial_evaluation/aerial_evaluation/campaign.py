@@ -16,6 +16,7 @@ import numpy as np
 from distributed import Client, LocalCluster, as_completed
 from scipy.stats import binomtest
 
+from aerial_evaluation import consistency
 from aerial_evaluation.closed_loop import run
 from aerial_model.config import closest
 from aerial_model.errors import AerialError, ConfigurationError, RefusalError
@@ -77,7 +78,10 @@ class Campaign:
     solver: str = "fatrop"
 
     def attempt(self, trial: Trial) -> dict[str, Any]:
-        """Run a trial; return seed, conditions, whether it landed, the reason if not, and the figures of a landing."""
+        """Return what came of a trial.
+
+        That is: seed, conditions, whether it landed, the reason if not, figures, samples of the estimate's errors.
+        """
         result = {"seed": trial.seed, "conditions": asdict(trial.conditions), "landed": False}
         try:
             outcome = run(
@@ -98,6 +102,7 @@ class Campaign:
             "landed": landing["landed"],
             "reason": ", ".join(outcome.landing.failed),
             **{name: landing[name] for name in FIGURES},
+            "estimate": outcome.estimate,
             "plan_time_s": outcome.planning.report.total_time_s,
             "real_time_factor": outcome.real_time_factor,
         }
@@ -193,6 +198,7 @@ def summary(done: Sequence[Mapping[str, Any]], variations: Sequence[Variation] =
         ],
         "conditions": groups,
         "figures": _figures(done),
+        "estimate": consistency.summary([result["estimate"] for result in done if "estimate" in result]),
     }
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from aerial_evaluation import consistency
 from aerial_evaluation.landing import OBSERVE_TIME, Landing, Tick, judge
 from aerial_model.plan import Plan
 from aerial_model.request import MotionRequest
@@ -34,9 +35,11 @@ class Outcome:
     planning: PlanningResult
     terrain: Terrain  # in W
     ticks: list[Tick] = field(repr=False)  # from the first, standing included
+    estimate: dict[str, dict[str, list[float]]] = field(repr=False)  # samples of its errors, see ``consistency``
     start_time: float  # when the controller accepted the plan [s]
     tick_time: np.ndarray  # (ticks,) wall time of the controller's steps [s]
     real_time_factor: float  # simulated over wall time, simulator and controller together
+    cpu_factor: float  # simulated over processor time: what the former is where nobody else computes
     seed: int
     noise: str
 
@@ -50,6 +53,8 @@ class Outcome:
                 "max": float(self.tick_time.max() * MICRO),
             },
             "real_time_factor": self.real_time_factor,
+            "cpu_factor": self.cpu_factor,
+            "estimate": consistency.summary([self.estimate]),
             "plan": self.planning.report.to_json(),
             "motion": self.planning.plan.motion,
             "robot": self.planning.plan.robot,
@@ -70,24 +75,37 @@ class Loop:
         self.simulation = simulation
         self.controller = controller
         self.ticks: list[Tick] = []
+        self.beliefs: list[consistency.Belief] = []  # of the same ticks
         self.tick_times: list[float] = []  # [s]
         self.wall_time = 0.0  # spent in ``advance`` [s]
+        self.cpu_time = 0.0  # of this process meanwhile [s]
+        self._q, self._v = simulation.state()  # the truth that the next command answers
+        self._origin, _ = simulation.robot.start_frame(self._q)  # of the estimator's frame, in W
 
     def advance(self, duration: float) -> None:
         """Run for ``duration`` [s] of simulated time."""
-        began = time.perf_counter()
+        began, cpu_began = time.perf_counter(), time.process_time()
         for _ in range(round(duration / self.simulation.control_dt)):
             self._tick()
         self.wall_time += time.perf_counter() - began
+        self.cpu_time += time.process_time() - cpu_began
 
     def _tick(self) -> None:
         fallbacks = self.controller.status.fallback_ticks
         began = time.perf_counter()
         command = self.controller.step(self.simulation.measure())
         self.tick_times.append(time.perf_counter() - began)
+        estimate, phase = self.controller.estimate, self.controller.phase
+        self.beliefs.append(consistency.Belief(phase=phase, estimate=estimate, q=self._q, v=self._v))
         self.simulation.step(command)
         fallback = self.controller.status.fallback_ticks > fallbacks
-        self.ticks.append(Tick(truth=self.simulation.ground_truth(), fallback=fallback))
+        truth = self.simulation.ground_truth()
+        self._q, self._v = truth.q, truth.v
+        self.ticks.append(Tick(truth=truth, fallback=fallback))
+
+    def estimate(self) -> dict[str, dict[str, list[float]]]:
+        """Return samples of the estimate's errors, phase by phase; see ``consistency.sampled``."""
+        return consistency.sampled(self.beliefs, self._origin)
 
 
 def run(
@@ -141,9 +159,11 @@ def run(
         planning=planning,
         terrain=simulation.terrain,
         ticks=loop.ticks,
+        estimate=loop.estimate(),
         start_time=start_time,
         tick_time=np.array(loop.tick_times),
         real_time_factor=simulation.time / loop.wall_time,
+        cpu_factor=simulation.time / loop.cpu_time,
         seed=seed,
         noise=noise,
     )

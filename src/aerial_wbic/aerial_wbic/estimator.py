@@ -87,18 +87,8 @@ class Estimator:
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything; the next measurement puts the centre of the support at the origin of W."""
+        """Forget everything; the next measurement puts the support's centre at the origin of W, unless it is localized."""
         self._time: float | None = None
-
-    @property
-    def position_variance(self) -> float:
-        """Of the base position along any axis of W [m²]."""
-        return float(self._belief.P[P, P])
-
-    @property
-    def velocity_variance(self) -> float:
-        """Of the base velocity along any axis of W [m²/s²]."""
-        return float(self._belief.P[V, V])
 
     def update(self, measurement: Measurement, contact: np.ndarray) -> Estimate:
         """Return the estimate at the measurement's time.
@@ -128,7 +118,13 @@ class Estimator:
         v[BASE_ANGULAR] = measurement.angular_velocity
         v[JOINT_VELOCITY] = measurement.joint_velocity
         _correct(self._belief, self._legs(measurement), contact, measurement.time, self._noise, q, v)
-        return Estimate(time=measurement.time, q=q, v=v)
+        return Estimate(
+            time=measurement.time,
+            q=q,
+            v=v,
+            position_variance=float(self._belief.P[P, P]),
+            velocity_variance=float(self._belief.P[V, V]),
+        )
 
     def _begin(self, measurement: Measurement) -> Belief:
         n_c = len(self._radius)
@@ -142,6 +138,10 @@ class Estimator:
         self._belief = belief
         offset = self._legs(measurement).offset
         belief.X[P] = [0.0, 0.0, self._radius.mean()] - offset.mean(axis=0)
+        belief.P[P, P] = self._noise.foot_position**2  # the attitude's error moves all offsets alike: no mean over feet
+        if measurement.localization is not None:
+            belief.X[P] = measurement.localization
+            belief.P[P, P] = self._noise.localization**2
         belief.P[V, V] = self._noise.foot_velocity**2
         for i in range(n_c):
             _anchor(belief, i, offset[i], self._noise)
@@ -250,7 +250,8 @@ def _correct_by_legs(belief: Belief, legs: Legs, contact: np.ndarray, time: floa
         innovation[row] = X[FEET + i] - legs.offset[i] - X[P]  # of 0 = p + R p_i − c_i
     innovation[n] = trust @ slip / trust.sum()
     variance[:n] *= noise.foot_position**2
-    variance[n] = noise.foot_velocity**2 / trust.sum()
+    in_motion = noise.foot_velocity_share**2 * (X[V] @ X[V])  # common to all points: no mean over them
+    variance[n] = noise.foot_velocity**2 / trust.sum() + in_motion
     _apply(belief, H, innovation, variance)
 
 

@@ -56,6 +56,7 @@ class EstimatorNoise(NamedTuple):
     touchdown_time: float  # after a scheduled touchdown for which contact points are believed less [s]
     localization: float  # of a measured base position [m]
     attitude_time: float  # time constant that draws the integrated gyro to the reported attitude [s]
+    foot_velocity_share: float = 0.0  # of the speed, by which a wrong attitude makes the legs' velocity wrong
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +95,7 @@ class ControllerGains:
                 raise ValueError(f"{path} must {'not be negative' if may_be_zero else 'be positive'}, found {value}")
 
 
-_MAY_BE_ZERO = ("stiffness", "angular_momentum_damping", "joint_damping", "stop_damping")
+_MAY_BE_ZERO = ("stiffness", "angular_momentum_damping", "joint_damping", "stop_damping", "foot_velocity_share")
 
 
 def _numbers(section: Any) -> Iterator[tuple[str, float]]:

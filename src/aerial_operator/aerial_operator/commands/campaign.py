@@ -12,6 +12,7 @@ from typing import Any
 
 from aerial_evaluation.campaign import FIGURES, Campaign, results, summary, trials, workers
 from aerial_evaluation.campaign_figure import draw
+from aerial_evaluation.consistency import ERRORS, NORMALIZED
 from aerial_model.robot import Robot
 from aerial_operator.console import ProgressBar, Report, UsageError, pairs, say, table, to_json
 from aerial_operator.goal import add_goal_arguments, request_from
@@ -127,6 +128,8 @@ def _text(figures: Mapping[str, Any]) -> str:
             for name, spread in figures["figures"].items()
         ]
         parts.append(table(["of those that landed", "median", "95 %", "largest"], rows))
+    if figures["estimate"]:
+        parts.append(_estimate(figures["estimate"]))
     if figures["failures"]:
         shown = figures["failures"][:FAILURES_SHOWN]
         rest = len(figures["failures"]) - len(shown)
@@ -136,3 +139,17 @@ def _text(figures: Mapping[str, Any]) -> str:
             + (f"\n  … and {rest} more" if rest else "")
         )
     return "\n\n".join(parts)
+
+
+def _estimate(phases: Mapping[str, Any]) -> str:
+    header = ["estimate in", *(f"{name} (95 %)" for name in ERRORS), *NORMALIZED, "if consistent"]
+    rows = [
+        [
+            phase,
+            *(f"{row[name]['rms']:.3g} ({row[name]['p95']:.3g})" for name in ERRORS),
+            *(f"{row[name]:.2f}" for name in NORMALIZED),
+            "{:.2f} … {:.2f}".format(*row["nees_interval95"]),
+        ]
+        for phase, row in phases.items()
+    ]
+    return table(header, rows)
