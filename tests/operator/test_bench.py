@@ -44,6 +44,7 @@ def test_bench_shows_progress(benched):
         (["bench"], 2, "WHAT"),
         (["bench", "robot"], 2, "planner"),
         (["bench", "planner", "--sections", "varants"], 2, "did you mean 'variants'"),
+        (["bench", "controller", "--sections", "variants"], 2, "there are ticks, solvers"),
         (["bench", "planner", "--motions", "jmup"], 1, "did you mean 'jump'"),
         (["bench", "planner", "--repeats", "0"], 1, "expected at least 1, found 0"),
         (["bench", "planner", "--goals", "-1"], 1, "expected at least 1, found -1"),

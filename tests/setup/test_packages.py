@@ -16,7 +16,15 @@ ROSDEP_KEYS |= {
     "scipy": "python3-scipy",
     "yaml": "python3-yaml",
 }
-WITHOUT_ROSDEP_KEY = {"casadi", "coal", "daqp", "mujoco", "osqp", "pinocchio", "rosbags"}  # README: from requirements.txt
+WITHOUT_ROSDEP_KEY = {
+    "casadi",
+    "coal",
+    "daqp",
+    "mujoco",
+    "osqp",
+    "pinocchio",
+    "rosbags",
+}  # README: from requirements.txt
 IN_ITS_OWN_ENVIRONMENT = {"crocoddyl"}  # a peer, in an environment that `aerial bench planner --with-crocoddyl` makes
 
 

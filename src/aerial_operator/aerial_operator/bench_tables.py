@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from aerial_evaluation.bench.ticks import PARTS
 from aerial_operator.console import percent, table
 
 Row = Mapping[str, Any]
@@ -62,6 +63,10 @@ def _reach(row: Row) -> str:
     return ", ".join(f"{axis} {low:.2f}…{high:.2f}" for axis, (low, high) in ends.items())
 
 
+def _micros(of: str, which: str, part: str | None = None) -> Callable[[Row], str]:
+    return lambda row: f"{(row[of] if part is None else row[of][part])[which]:.0f} µs"
+
+
 def _motion(row: Row) -> str:
     return row["motion"]
 
@@ -70,6 +75,31 @@ _TIMES = {"median": _seconds("total_time_s"), "95 %": _seconds("total_time_s", "
 _COUNTS = {"solved": _count("solved"), "within limits": _count("accepted")}
 
 _TABLES = {
+    "ticks": _Table(
+        "Ticks of the controller: CPU time, whole and by part (medians)",
+        {
+            "motion": _motion,
+            "tasks": lambda row: row["tasks"],
+            "solver": lambda row: row["qp_solver"],
+            "median": _micros("tick_us", "p50"),
+            "99 %": _micros("tick_us", "p99"),
+            "largest": _micros("tick_us", "max"),
+            **{part: _micros("parts_us", "p50", part) for part in PARTS},
+        },
+    ),
+    "solvers": _Table(
+        "Solvers of the quadratic program, on the same problems of ticks with contact: CPU time from numbers to forces",
+        {
+            "motion": _motion,
+            "solver": lambda row: row["qp_solver"],
+            "problems": lambda row: str(row["problems"]),
+            "solved": _count("solved"),
+            "median": _micros("time_us", "p50"),
+            "99 %": _micros("time_us", "p99"),
+            "largest": _micros("time_us", "max"),
+            "forces differ by": lambda row: f"{row['greatest_difference_n']:.2f} N",
+        },
+    ),
     "variants": _Table(
         "Variants (thesis, table 4.1): request to plan; peaks by exact inverse dynamics",
         {

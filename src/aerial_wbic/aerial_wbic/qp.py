@@ -243,17 +243,32 @@ def reduced(data: np.ndarray, indices: np.ndarray, indptr: np.ndarray, lower: np
         lower: least values of A's rows; the first six are equations.
         upper: greatest values.
     """
-    rows, n = len(lower), len(indptr) - 1
-    dense = np.zeros((rows, n))
-    for column in range(n):
+    rows, n = len(lower) - _N_BASE, len(indptr) - 1 - _N_BASE
+    G, A_y = np.zeros((_N_BASE, n)), np.zeros((rows, _N_BASE))
+    A, H, f = np.zeros((rows, n)), np.eye(n), np.zeros(n)
+    above, below = upper[_N_BASE:].copy(), lower[_N_BASE:].copy()
+    for column in range(_N_BASE + n):
         for entry in range(indptr[column], indptr[column + 1]):
-            dense[indices[entry], column] = data[entry]
-    G = -dense[:_N_BASE, _N_BASE:].copy()
-    g = lower[:_N_BASE].copy()
-    A_y, A_x = dense[_N_BASE:, :_N_BASE].copy(), dense[_N_BASE:, _N_BASE:].copy()
-    shift = A_y @ g
-    H = G.T @ G + np.eye(n - _N_BASE)
-    return Reduced(H, G.T @ g, A_x + A_y @ G, upper[_N_BASE:] - shift, lower[_N_BASE:] - shift)
+            row = indices[entry]
+            if column < _N_BASE and row >= _N_BASE:
+                A_y[row - _N_BASE, column] = data[entry]
+                above[row - _N_BASE] -= data[entry] * lower[column]
+                below[row - _N_BASE] -= data[entry] * lower[column]
+            elif column >= _N_BASE and row < _N_BASE:
+                G[row, column - _N_BASE] = -data[entry]
+                f[column - _N_BASE] -= data[entry] * lower[row]
+            elif column >= _N_BASE:
+                A[row - _N_BASE, column - _N_BASE] = data[entry]
+    for i in range(n):
+        for j in range(n):
+            for k in range(_N_BASE):
+                H[i, j] += G[k, i] * G[k, j]
+    for row in range(rows):
+        for k in range(_N_BASE):
+            if A_y[row, k] != 0.0:
+                for j in range(n):
+                    A[row, j] += A_y[row, k] * G[k, j]
+    return Reduced(H, f, A, above, below)
 
 
 @compiled

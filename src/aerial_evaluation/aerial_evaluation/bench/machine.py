@@ -8,7 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-_PACKAGES = ("numpy", "casadi", "pin", "coal", "osqp", "mujoco")
+_PACKAGES = ("numpy", "casadi", "pin", "coal", "osqp", "daqp", "numba", "mujoco")
 
 
 def machine() -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from aerial_evaluation.bench.goals import goals
 from aerial_evaluation.bench.literal import literal
@@ -32,9 +32,11 @@ SECTIONS: dict[str, Callable[[Subject], list[Row]]] = {
 }
 
 
-def measured(subject: Subject, sections: Sequence[str]) -> Iterator[Row]:
-    """Yield the rows of the sections asked for, in the order of ``SECTIONS``; each names its section and robot."""
-    for name, section in SECTIONS.items():
-        if name in sections:
+def measured(
+    subject: Subject, names: Sequence[str], sections: Mapping[str, Callable[[Subject], list[Row]]] = SECTIONS
+) -> Iterator[Row]:
+    """Yield the rows of the sections asked for, in the order of ``sections``; each names its section and robot."""
+    for name, section in sections.items():
+        if name in names:
             for row in section(subject):
                 yield {"section": name, "robot": subject.robot.name, **row}

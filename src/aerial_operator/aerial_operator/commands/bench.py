@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from aerial_evaluation.bench import controller, planner
 from aerial_evaluation.bench.machine import machine
 from aerial_evaluation.bench.peer import Environment
-from aerial_evaluation.bench.planner import SECTIONS, measured
+from aerial_evaluation.bench.planner import measured
 from aerial_evaluation.bench.subject import Subject, motions_of
 from aerial_model.config import closest
 from aerial_model.errors import ConfigurationError
@@ -18,24 +19,35 @@ from aerial_operator.planning import compile_functions
 from aerial_planner.compiled import default_cache
 from aerial_planner.kino_dynamic import Variant
 
+SECTIONS = {"planner": planner.SECTIONS, "controller": controller.SECTIONS}
 REPEATS = 10
 GOALS = 50
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what is measured, how much of it, and where the figures go."""
-    parser.add_argument("what", metavar="WHAT", choices=("planner",), help="planner")
+    parser.add_argument("what", metavar="WHAT", choices=tuple(SECTIONS), help=" or ".join(SECTIONS))
     parser.add_argument(
         "--sections",
         metavar="NAME[,…]",
         type=_names,
-        help=f"of the benchmark (default: all, crocoddyl where it is installed): {', '.join(SECTIONS)}",
+        help="of the benchmark (default: all, crocoddyl where it is installed): "
+        + "; ".join(f"{what}: {', '.join(sections)}" for what, sections in SECTIONS.items()),
     )
-    parser.add_argument("--motions", metavar="NAME[,…]", type=_names, help="(default: all it has the contacts for)")
-    parser.add_argument("--repeats", metavar="N", type=int, default=REPEATS, help=f"(default: {REPEATS})")
-    parser.add_argument("--goals", metavar="N", type=int, default=GOALS, help=f"of each motion (default: {GOALS})")
     parser.add_argument(
-        "--interpreted", action="store_true", help="leave out what `aerial compile` does; else it is done first"
+        "--motions",
+        metavar="NAME[,…]",
+        type=_names,
+        help=f"(default: for the planner all it has the contacts for, for the controller {', '.join(controller.MOTIONS)})",
+    )
+    parser.add_argument("--repeats", metavar="N", type=int, default=REPEATS, help=f"(default: {REPEATS})")
+    parser.add_argument(
+        "--goals", metavar="N", type=int, default=GOALS, help=f"of each motion, for the planner (default: {GOALS})"
+    )
+    parser.add_argument(
+        "--interpreted",
+        action="store_true",
+        help="for the planner: leave out what `aerial compile` does; else it is done first",
     )
     parser.add_argument(
         "--with-crocoddyl", action="store_true", help="install crocoddyl for itself, if it is not there"
@@ -49,7 +61,7 @@ def run(args: argparse.Namespace) -> Report:
     robot = Robot.load(args.robot)
     subject = Subject(
         robot=robot,
-        motions=args.motions or motions_of(robot),
+        motions=args.motions or _motions(args.what, robot),
         repeats=args.repeats,
         goals=args.goals,
         seed=args.seed,
@@ -67,25 +79,32 @@ def run(args: argparse.Namespace) -> Report:
     }
     file = args.out / f"{args.what}.json"
     _write(file, to_json(figures))  # before an hour is spent on what cannot be written
-    if not args.interpreted:
+    if args.what == "planner" and not args.interpreted:
         compile_functions(robot, subject.motions, Variant)
-    for row in measured(subject, sections):
+    for row in measured(subject, sections, SECTIONS[args.what]):
         figures["rows"].append(row)
         _write(file, to_json(figures))
     say(f"figures are in {file}")
     return Report(success=True, figures=figures, text=tables(figures["rows"]))
 
 
+def _motions(what: str, robot: Robot) -> tuple[str, ...]:
+    """Return the motions that are measured unless others are asked for."""
+    motions = motions_of(robot)
+    return motions if what == "planner" else tuple(name for name in motions if name in controller.MOTIONS)
+
+
 def _sections(args: argparse.Namespace) -> list[str]:
     """Return what to measure; a peer that is not installed is left out, unless it is asked for."""
+    known = SECTIONS[args.what]
     for name in args.sections or ():
-        if name not in SECTIONS:
-            raise UsageError(f"no section '{name}'{closest(name, SECTIONS)}; there are {', '.join(SECTIONS)}")
+        if name not in known:
+            raise UsageError(f"no section '{name}'{closest(name, known)}; there are {', '.join(known)}")
     environment = Environment()
     if args.with_crocoddyl and not environment.is_made:
         say(f"installing crocoddyl in {environment.folder}")
         environment.make()
-    sections = list(args.sections or SECTIONS)
+    sections = list(args.sections or known)
     if "crocoddyl" in sections and not environment.is_made:
         if args.sections:
             raise ConfigurationError(environment.missing)
