@@ -12,17 +12,19 @@ from aerial_evaluation.bench.subject import Subject, motions_of
 from aerial_model.config import closest
 from aerial_model.errors import ConfigurationError
 from aerial_model.robot import Robot
+from aerial_operator import loop_bench
 from aerial_operator.bench_tables import tables
 from aerial_operator.console import Report, UsageError, say, to_json
 from aerial_planner.compiled import default_cache
 
 REPEATS = 10
 GOALS = 50
+SECONDS = 60.0  # [s]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what is measured, how much of it, and where the figures go."""
-    parser.add_argument("what", metavar="WHAT", choices=("planner",), help="planner")
+    parser.add_argument("what", metavar="WHAT", choices=("planner", "loop"), help="planner or loop")
     parser.add_argument(
         "--sections",
         metavar="NAME[,…]",
@@ -36,11 +38,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--with-crocoddyl", action="store_true", help="install crocoddyl for itself, if it is not there"
     )
+    parser.add_argument(
+        "--seconds", metavar="N", type=float, default=SECONDS, help=f"that the loop runs for (default: {SECONDS:.0f})"
+    )
     parser.add_argument("--out", metavar="FOLDER", type=Path, default=Path("out/bench"), help="(default: out/bench)")
 
 
 def run(args: argparse.Namespace) -> Report:
     """Measure section by section; the file holds what is measured so far, if a long run is interrupted."""
+    if args.what == "loop":
+        return _loop(args)
     sections = _sections(args)
     robot = Robot.load(args.robot)
     subject = Subject(
@@ -68,6 +75,18 @@ def run(args: argparse.Namespace) -> Report:
         _write(file, to_json(figures))
     say(f"figures are in {file}")
     return Report(success=True, figures=figures, text=tables(figures["rows"]))
+
+
+def _loop(args: argparse.Namespace) -> Report:
+    """Measure the control loop; it succeeds if the robot stayed on its feet to the end."""
+    file = args.out / "loop.json"
+    _write(file, "{}")  # before a minute is spent on what cannot be written
+    figures = loop_bench.measure(
+        args.robot, motions=args.motions or (), seconds=args.seconds, seed=args.seed, folder=args.out
+    )
+    _write(file, to_json(figures))
+    say(f"figures are in {file}")
+    return Report(success=figures["complete"], figures=figures, text=loop_bench.tables(figures))
 
 
 def _sections(args: argparse.Namespace) -> list[str]:
