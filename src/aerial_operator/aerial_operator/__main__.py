@@ -24,7 +24,7 @@ COMMANDS = {
     "simulate": "plan one motion, then run it in closed loop in one process, and judge the landing",
     "campaign": "many seeded trials of one motion in parallel: the share that lands, and which seeds do not",
     "compile": "compile the planner's functions once, so that plans take half the time",
-    "bench": "measure how fast and how reliably motions are planned, next to the thesis and to peers",
+    "bench": "measure how fast and how reliably motions are planned, or how the control loop keeps up",
     "up": "start planner, controller and simulator, and keep them running",
     "select": "ask running nodes for one motion, and wait for what comes of it",
 }

@@ -20,7 +20,8 @@ from aerial_model.request import ControllerCommand, MotionRequest
 from aerial_model.ros import qos
 from aerial_model.ros.messages import code_from_message, from_stamp, outcome_from_message, selection_to_message
 from aerial_msgs.msg import ControllerStatus, MotionResult, MotionSelection
-from aerial_operator.nodes import CONTROLLER, PLANNER, PROGRAMS, NodeProgram
+from aerial_msgs.srv import Reset
+from aerial_operator.nodes import CONTROLLER, PLANNER, PROGRAMS, SIMULATOR, NodeProgram
 
 WARMING_UP = "warming up"  # how the planner's diagnostics begin then
 DISCOVERY_TIMEOUT = 8.0  # for a listener to be found, on a machine whose cores are busy [s]
@@ -140,6 +141,22 @@ class Client(Node):
             answers.append(self._next_answer(request, answers, selected, server.name))
             heard(answers[-1])
         return request.request_id, answers
+
+    def reset_robot(self, seed: int) -> None:
+        """Put the simulated robot back to its start; return when it stands there, its counters at zero.
+
+        Raises:
+            RefusalError: with code TIMEOUT if it does not come to stand.
+        """
+        service = self.create_client(Reset, f"{SIMULATOR.name}/reset")
+        before = self.time
+        answered = self.wait(service.service_is_ready, DISCOVERY_TIMEOUT)
+        if answered:
+            future = service.call_async(Reset.Request(seed=seed))
+            answered = self.wait(future.done, START_TIMEOUT)
+        self.destroy_client(service)
+        if not answered or not self.wait(lambda: self.time < before and not self.missing, START_TIMEOUT):
+            raise _timeout(f"the robot did not stand again within {START_TIMEOUT:.0f} s after its reset")
 
     def _next_answer(self, request: MotionRequest, answers: list[Answer], selected: float, server: str) -> Answer:
         if not answers:

@@ -13,6 +13,7 @@ from aerial_evaluation.bench.subject import Subject, motions_of
 from aerial_model.config import closest
 from aerial_model.errors import ConfigurationError
 from aerial_model.robot import Robot
+from aerial_operator import loop_bench
 from aerial_operator.bench_tables import tables
 from aerial_operator.console import Report, UsageError, say, to_json
 from aerial_operator.planning import compile_functions
@@ -22,11 +23,12 @@ from aerial_planner.kino_dynamic import Variant
 SECTIONS = {"planner": planner.SECTIONS, "controller": controller.SECTIONS}
 REPEATS = 10
 GOALS = 50
+SECONDS = 60.0  # [s]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what is measured, how much of it, and where the figures go."""
-    parser.add_argument("what", metavar="WHAT", choices=tuple(SECTIONS), help=" or ".join(SECTIONS))
+    parser.add_argument("what", metavar="WHAT", choices=(*SECTIONS, "loop"), help=f"{', '.join(SECTIONS)} or loop")
     parser.add_argument(
         "--sections",
         metavar="NAME[,…]",
@@ -52,11 +54,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--with-crocoddyl", action="store_true", help="install crocoddyl for itself, if it is not there"
     )
+    parser.add_argument(
+        "--seconds", metavar="N", type=float, default=SECONDS, help=f"that the loop runs for (default: {SECONDS:.0f})"
+    )
     parser.add_argument("--out", metavar="FOLDER", type=Path, default=Path("out/bench"), help="(default: out/bench)")
 
 
 def run(args: argparse.Namespace) -> Report:
     """Measure section by section; the file holds what is measured so far, if a long run is interrupted."""
+    if args.what == "loop":
+        return _loop(args)
     sections = _sections(args)
     robot = Robot.load(args.robot)
     subject = Subject(
@@ -92,6 +99,18 @@ def _motions(what: str, robot: Robot) -> tuple[str, ...]:
     """Return the motions that are measured unless others are asked for."""
     motions = motions_of(robot)
     return motions if what == "planner" else tuple(name for name in motions if name in controller.MOTIONS)
+
+
+def _loop(args: argparse.Namespace) -> Report:
+    """Measure the control loop; it succeeds if the robot stayed on its feet to the end."""
+    file = args.out / "loop.json"
+    _write(file, "{}")  # before a minute is spent on what cannot be written
+    figures = loop_bench.measure(
+        args.robot, motions=args.motions or (), seconds=args.seconds, seed=args.seed, folder=args.out
+    )
+    _write(file, to_json(figures))
+    say(f"figures are in {file}")
+    return Report(success=figures["complete"], figures=figures, text=loop_bench.tables(figures))
 
 
 def _sections(args: argparse.Namespace) -> list[str]:

@@ -7,19 +7,18 @@ import bisect
 import os
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from aerial_model.errors import RefusalCode, RefusalError
 from aerial_model.request import MotionRequest
 from aerial_model.robot import Robot
-from aerial_operator.client import Answer, Client, connected
+from aerial_operator.client import connected
 from aerial_operator.console import Report, percent, say, table
+from aerial_operator.live import Attempt, attempt, await_ready, keep_apart
 from aerial_operator.nodes import PLANNER, SIMULATOR, NodeProcesses, parameters
 from aerial_operator.pictures import save_picture
 from aerial_operator.recording import Recorder
-from aerial_operator.trial import Execution, Trial, execution, judged
+from aerial_operator.trial import Trial, judged
 
 MOTION = "jump"
 JUMPS = {
@@ -28,21 +27,7 @@ JUMPS = {
     "0.2 m to the left": (0.0, 0.2, 0.0),
     "0.6 m onto a platform": (0.6, 0.0, 0.16),
 }  # displacement of the landing [m]
-READY_TIMEOUT = 60.0  # [s]
-OBSERVE_SPARE = 0.2  # after a landing's observation: its last ground truth may arrive after the clock [s]
-STATE_TIMEOUT = 10.0  # for simulated time to go on, and for diagnostics [s]
 _NICENESS = 5  # of this process: recording can wait
-_DOMAINS = 100  # ROS domains 1 … 100, of which a demo takes one
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Jump:
-    """One jump of the demo."""
-
-    name: str
-    request_id: str
-    answers: list[Answer]
-    execution: Execution | None  # None: it never began
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -56,8 +41,7 @@ def run(args: argparse.Namespace) -> Report:
     robot = Robot.load(args.robot)
     folder = args.out / "demo"
     folder.mkdir(parents=True, exist_ok=True)
-    os.environ["ROS_DOMAIN_ID"] = str(os.getpid() % _DOMAINS + 1)  # apart from whatever else runs
-    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    keep_apart()
     log = folder / "nodes.log"
     told = parameters(args.robot, seed=args.seed, noise=args.noise)
     told[PLANNER.name]["warm_up"] = MOTION
@@ -65,9 +49,12 @@ def run(args: argparse.Namespace) -> Report:
         os.nice(_NICENESS)
         recorder = Recorder(client)
         say(f"simulator, controller and planner start as three processes; they log to {log}")
-        _await_ready(client)
+        await_ready(client)
         before, began = client.figures(SIMULATOR), time.time()
-        jumps = [_jump(robot, client, recorder, name, displacement) for name, displacement in JUMPS.items()]
+        jumps = [
+            attempt(robot, client, recorder, name, _request(robot, displacement))
+            for name, displacement in JUMPS.items()
+        ]
         control = _control_figures(before, client.figures(SIMULATOR), recorder, began)
     say("judging by ground truth, writing the recording, drawing")
     recorder.write(folder / "recording")
@@ -85,28 +72,9 @@ def run(args: argparse.Namespace) -> Report:
     return Report(success=landed, figures=figures, text=_summary(figures))
 
 
-def _await_ready(client: Client) -> None:
-    """Wait until the robot stands and the planner is warm.
-
-    Raises:
-        RefusalError: if it takes too long.
-    """
-    if not client.wait(lambda: not client.missing and client.warm, READY_TIMEOUT):
-        missing = "; ".join(client.missing) or "the planner is warming up"
-        raise RefusalError(RefusalCode.TIMEOUT, f"not ready after {READY_TIMEOUT:.0f} s: {missing}")
-
-
-def _jump(robot: Robot, client: Client, recorder: Recorder, name: str, displacement: tuple[float, ...]) -> _Jump:
-    """Select a jump; wait until it is over and its landing has been observed."""
+def _request(robot: Robot, displacement: tuple[float, ...]) -> MotionRequest:
     request = MotionRequest(motion=MOTION, displacement=displacement)
-    if displacement[2]:
-        request = request.with_platform(robot)
-    say(f"jump {name}")
-    request_id, answers = client.select(request, heard=lambda answer: say(f"  {answer}"))
-    done = execution(robot, recorder, request_id)
-    if done is not None:
-        client.wait(lambda: client.time > done.end_time + OBSERVE_SPARE, STATE_TIMEOUT)
-    return _Jump(name=name, request_id=request_id, answers=answers, execution=done)
+    return request.with_platform(robot) if displacement[2] else request
 
 
 def _control_figures(
@@ -124,7 +92,7 @@ def _control_figures(
     }
 
 
-def _motion_figures(robot: Robot, jump: _Jump, trial: Trial | None, args: argparse.Namespace) -> dict[str, Any]:
+def _motion_figures(robot: Robot, jump: Attempt, trial: Trial | None, args: argparse.Namespace) -> dict[str, Any]:
     last = jump.answers[-1]
     return {
         "motion": MOTION,

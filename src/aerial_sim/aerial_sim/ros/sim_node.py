@@ -118,6 +118,7 @@ class SimNode(AerialNode):
                 "rejected_commands": self._rejected_commands,
                 "round_trip_us_p50": self._round_trip.percentile(50) * MICRO,
                 "round_trip_us_p99": self._round_trip.percentile(99) * MICRO,
+                "round_trip_us_max": self._round_trip.percentile(100) * MICRO,
             }
         if not session.started:
             return DiagnosticStatus.WARN, "waiting for a first joint_command", figures
