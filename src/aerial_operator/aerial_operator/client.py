@@ -26,7 +26,9 @@ from aerial_operator.nodes import CONTROLLER, PLANNER, PROGRAMS, SIMULATOR, Node
 WARMING_UP = "warming up"  # how the planner's diagnostics begin then
 DISCOVERY_TIMEOUT = 8.0  # for a listener to be found, on a machine whose cores are busy [s]
 PLANNING_TIMEOUT = 15.0  # for a first answer; a planner that has just started builds its problems first [s]
-START_TIMEOUT = 8.0  # from plan to motion; nodes that have just started must find each other first [s]
+START_TIMEOUT = (
+    15.0  # from plan to motion; nodes that have just started must find each other first, however busy the cores [s]
+)
 MOTION_TIMEOUT = 20.0  # from start to end [s]
 DIAGNOSTICS_TIMEOUT = 5.0  # [s]
 _CHECK_PERIOD = 0.25  # [s]
