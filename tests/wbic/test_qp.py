@@ -18,7 +18,7 @@ from aerial_wbic.target import shared_load
 EQUATION_TOLERANCE = 1e-8  # [N], [N·m]
 FORCE_TOLERANCE = 0.1  # that a force may leave the pyramid [N]
 GRADIENT_TOLERANCE = 0.03  # of the cost's gradient, relative to its largest part
-KKT_TOLERANCE = 1e-7  # of the independent optimum, relative to the cost's gradient
+KKT_TOLERANCE = 1e-6  # of the independent optimum, relative to the cost's gradient
 OPTIMUM_TOLERANCE = 0.01  # between the solver's forces and the independent ones, relative to the largest
 ROOM_TOLERANCE = 0.5  # by which a torque may leave its room [N·m], or a force the pyramid on that account [N]
 ACTIVE = 0.3  # slack below which a face of the pyramid is taken to bear [N]
@@ -117,7 +117,9 @@ def test_the_optimum_is_that_of_another_method_and_meets_the_kkt_conditions(
     np.testing.assert_allclose(H @ best + g, W.T @ multipliers, atol=KKT_TOLERANCE * size)  # stationary
     assert (W @ best).min() > -KKT_TOLERANCE * size  # primal feasible
     assert multipliers.min() >= 0.0  # dual feasible
-    np.testing.assert_allclose(multipliers * (W @ best), 0.0, atol=KKT_TOLERANCE * size**2)  # complementary
+    np.testing.assert_allclose(
+        multipliers * (W @ best), 0.0, atol=KKT_TOLERANCE * size * (1 + multipliers.max())
+    )  # complementary
     found = optimization.solve(state, vdot_cmd, f_cmd, contact).force[contact].ravel()
     np.testing.assert_allclose(found, best, atol=OPTIMUM_TOLERANCE * (1 + np.abs(best).max()))
 
