@@ -98,9 +98,11 @@ class Sensors:
             position: of the joints ``(n,)`` [rad].
             torque: of the motors ``(n,)``; what overcomes dry friction moves them through the gears' play [N·m].
         """
-        pressing = np.abs(torque) > self._dry_friction
-        self._flank[pressing] = np.sign(torque[pressing])
-        of_motor = position + self._noise.gear_backlash / 2 * self._flank
+        of_motor = position
+        if self._noise.gear_backlash:
+            pressing = np.abs(torque) > self._dry_friction
+            self._flank[pressing] = np.sign(torque[pressing])
+            of_motor = position + self._noise.gear_backlash / 2 * self._flank
         if self._encoder_step is not None:
             of_motor = self._encoder_step * np.round(of_motor / self._encoder_step)
         return of_motor + self._encoder_bias

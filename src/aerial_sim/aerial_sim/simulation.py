@@ -252,14 +252,15 @@ class Simulation:
         rate does, so that its integral is the true change of velocity, impacts included.
         """
         q, v = self.state()
+        torque = self._drive.delivered_torque
         return Measurement(
             time=self.time,
             orientation=self._sensors.orientation(q[BASE_ORIENTATION]),
             angular_velocity=self._sensors.angular_velocity(v[BASE_ANGULAR]),
             linear_acceleration=self._sensors.linear_acceleration(self._R_WB().T @ specific_force),
-            joint_position=self._sensors.joint_position(q[JOINT_POSITION], self._drive.delivered_torque),
+            joint_position=self._sensors.joint_position(q[JOINT_POSITION], torque),
             joint_velocity=self._sensors.joint_velocity(v[JOINT_VELOCITY]),
-            joint_torque=self._drive.delivered_torque,
+            joint_torque=torque,
             sequence=self._ticks,
             localization=self._sensors.localization(self.time, q[BASE_POSITION] - self._origin),
         )
