@@ -1,5 +1,7 @@
 """The planner's node in one process with its clients: every selection answered, previews, and nothing ends it."""
 
+import time
+
 import numpy as np
 import pytest
 from nav_msgs.msg import Odometry
@@ -11,7 +13,7 @@ from sensor_msgs.msg import JointState
 from aerial_model.request import ControllerCommand, MotionRequest
 from aerial_model.robot import Robot
 from aerial_model.ros import qos
-from aerial_model.ros.messages import plan_from_message, selection_to_message
+from aerial_model.ros.messages import plan_from_message, result_to_message, selection_to_message, to_stamp
 from aerial_msgs.action import PlanMotion
 from aerial_msgs.msg import MotionPlan, MotionResult, MotionSelection, TerrainBox
 from aerial_planner.planner import Planner
@@ -37,6 +39,7 @@ class Operator(Node):
         self.selections = self.create_publisher(MotionSelection, "motion_selection", qos.EVENT)
         self.odometry = self.create_publisher(Odometry, "odometry", qos.TELEMETRY)
         self.joint_states = self.create_publisher(JointState, "joint_states", qos.TELEMETRY)
+        self.answers = self.create_publisher(MotionResult, "motion_result", qos.EVENT)  # the controller's
         self.previews = ActionClient(self, PlanMotion, "plan_motion")
 
     def preview(self, selection):
@@ -95,6 +98,19 @@ def test_a_selection_gets_a_plan_and_is_told_so(operator, ask, until, robot):
     assert (answer.outcome, answer.code, answer.reason) == (MotionResult.PLANNED, MotionResult.NONE, "")
     assert plan.request_id == "a"
     np.testing.assert_allclose(plan.landing_support_centre, [0.3, 0.0, 0.0], atol=1e-9)
+
+
+def test_a_plan_is_repeated_until_a_controller_answers(operator, ask, executor, until, monkeypatch):
+    monkeypatch.setattr(planner_node, "REPEAT_TIME", PATIENCE)
+    ask(jump("a"))
+    until(lambda: len(operator.plans) == 2)
+    assert operator.plans[0] == operator.plans[1]
+    operator.answers.publish(result_to_message("a", "jump", MotionResult.STARTED, to_stamp(0.0), None))
+    until(lambda: operator.results[-1].outcome == MotionResult.STARTED)
+    known = len(operator.plans)
+    since = time.monotonic()
+    until(lambda: time.monotonic() > since + 2 * planner_node.REPEAT_PERIOD)
+    assert len(operator.plans) <= known + 1  # one may have been on its way
 
 
 def test_without_an_estimate_the_plan_starts_from_the_home_stance(operator, ask, until, robot):

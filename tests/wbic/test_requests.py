@@ -68,6 +68,11 @@ def test_a_plan_starts_and_lands(requests, controller, plan):
     assert requests.finish() == []
 
 
+def test_a_plan_that_comes_again_while_it_runs_gets_its_answer_again(requests, controller, plan):
+    assert requests.execute(plan) == requests.execute(plan)
+    assert controller.calls == ["accept"]
+
+
 @pytest.mark.parametrize(("phase", "code"), [(Phase.LIE, RefusalCode.FELL), (Phase.STOPPED, RefusalCode.NOT_STANDING)])
 def test_a_motion_that_ends_badly_fails(requests, controller, plan, phase, code):
     requests.execute(plan)

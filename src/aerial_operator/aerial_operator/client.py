@@ -184,7 +184,9 @@ class Client(Node):
         return any(end.node_name == name for end in self.get_subscriptions_info_by_topic("motion_selection"))
 
     def _on_result(self, message: MotionResult) -> None:
-        self._results.append((time.monotonic(), message))
+        known = {(result.request_id, result.outcome) for _, result in self._results}
+        if (message.request_id, message.outcome) not in known:  # a repeated plan is answered again
+            self._results.append((time.monotonic(), message))
 
     def _on_status(self, message: ControllerStatus) -> None:
         self.status = message

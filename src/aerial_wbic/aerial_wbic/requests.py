@@ -53,8 +53,10 @@ class Requests:
         self._running: _Request | None = None
 
     def execute(self, plan: Plan) -> list[Answer]:
-        """Return the answers to a plan's arrival."""
+        """Return the answers to a plan's arrival; one that comes again while it runs gets its answer again."""
         request = _Request(plan.request_id, plan.motion)
+        if request == self._running:
+            return [request.answer(Outcome.STARTED)]
         try:
             self._controller.accept(plan)
         except InvalidPlanError as error:

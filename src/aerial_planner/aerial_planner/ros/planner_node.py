@@ -36,8 +36,8 @@ from aerial_planner.planner import Planner
 from aerial_planner.ros.worker import Worker
 from aerial_planner.schedule import known_motions
 
-DISCOVERY_TIMEOUT = 5.0  # for a controller to be found that has just started, on a busy machine [s]
-DISCOVERY_PERIOD = 0.01  # between two looks [s]
+REPEAT_PERIOD = 0.5  # from one publication of a plan that no controller has answered to the next [s]
+REPEAT_TIME = 8.0  # for which it is repeated: on a busy machine, nodes that have just started find each other late [s]
 
 
 class _CancelledError(Exception):
@@ -76,7 +76,11 @@ class PlannerNode(node.AerialNode):
         self._counts = {"planned": 0, "refused": 0}
         self._plans = self.create_lifecycle_publisher(MotionPlan, "motion_plan", qos.EVENT)
         self._results = self.create_lifecycle_publisher(MotionResult, "motion_result", qos.EVENT)
+        self._unanswered: MotionPlan | None = None  # the last plan, until a controller says what becomes of it
+        self._repeat_until = 0.0  # monotonic [s]
+        self._repeater = self.create_timer(REPEAT_PERIOD, self._repeat)
         self._inputs = [
+            self.create_subscription(MotionResult, "motion_result", self._on_result, qos.EVENT),
             self.create_subscription(MotionSelection, "motion_selection", self._on_selection, qos.EVENT),
             self.create_subscription(Odometry, "odometry", partial(setattr, self, "_odometry"), qos.TELEMETRY),
             self.create_subscription(JointState, "joint_states", partial(setattr, self, "_joints"), qos.TELEMETRY),
@@ -104,6 +108,7 @@ class PlannerNode(node.AerialNode):
     def cleanup(self) -> None:
         """Finish the plan that is being made, then close the interfaces."""
         self._worker.shutdown()
+        self.destroy_timer(self._repeater)
         self._previews.destroy()
         for subscription in self._inputs:
             self.destroy_subscription(subscription)
@@ -148,14 +153,19 @@ class PlannerNode(node.AerialNode):
     def _plan(self, selection: MotionSelection, start: Estimate | None) -> None:
         result = self._planner.plan(selection_from_message(selection), start)
         self._answer(selection, MotionResult.PLANNED)
-        self._await_controller()
-        self._plans.publish(plan_to_message(result.plan, self._robot))
+        self._unanswered, self._repeat_until = plan_to_message(result.plan, self._robot), time.monotonic() + REPEAT_TIME
+        self._plans.publish(self._unanswered)
 
-    def _await_controller(self) -> None:
-        """Wait until somebody listens for plans: on a busy machine nodes find each other after they have started."""
-        deadline = time.monotonic() + DISCOVERY_TIMEOUT
-        while self._plans.get_subscription_count() == 0 and time.monotonic() < deadline:
-            time.sleep(DISCOVERY_PERIOD)
+    def _on_result(self, result: MotionResult) -> None:
+        plan = self._unanswered
+        if plan is not None and result.request_id == plan.request_id and result.outcome != MotionResult.PLANNED:
+            self._unanswered = None
+
+    def _repeat(self) -> None:
+        """Publish the last plan again while no controller has answered it: it may not have been found when it came."""
+        plan = self._unanswered
+        if plan is not None and self._active and time.monotonic() < self._repeat_until:
+            self._plans.publish(plan)
 
     def _answer(self, selection: MotionSelection, outcome: int, refusal: RefusalError | None = None) -> None:
         self._counts["planned" if refusal is None else "refused"] += 1
