@@ -14,6 +14,7 @@ from aerial_model.robot import BASE_ORIENTATION
 from aerial_model.state import Estimate
 from aerial_model.terrain import Terrain
 from aerial_planner.planner import Planner
+from aerial_planner.schedule import load_motion
 
 from .conftest import jump
 
@@ -36,6 +37,7 @@ GOALS = [
     ("quarter turn", jump(0.0, 0.0, yaw=-np.pi / 2)),
     ("onto a platform", jump(0.6, 0.0, 0.16, terrain=Terrain.platform(0.16, 0.3, 0.0))),
     ("off a platform", jump(0.7, 0.0, -0.16, terrain=Terrain.platform(-0.16, 0.24, 0.0))),
+    ("roll", MotionRequest(motion="barrel_roll", displacement=np.array([0.0, -0.2, 0.0]))),
 ]
 
 
@@ -73,12 +75,38 @@ def test_the_accelerations_of_a_turning_motion_need_no_force_from_nowhere(planne
 @pytest.mark.parametrize("turns", [1.0, -1.0])
 def test_feet_that_have_left_the_ground_keep_clear_of_it_while_others_push(planner, turns):
     plan = planner.plan(MotionRequest(motion="barrel_roll", rotation=turns)).plan
-    settings, step = planner.settings, plan.time[1]
-    lifted = np.cumsum(~plan.contact, axis=0) * step > settings.swing_rise_time + 1.5 * step
+    settings, steps = planner.settings, np.diff(plan.time, prepend=0.0)[:, None]
+    lifted = np.cumsum(~plan.contact * steps, axis=0) > settings.swing_rise_time + 1.5 * settings.dt
     pushing = plan.contact.any(axis=1)
     rise = (plan.foot_position - plan.foot_position[0])[..., 2]
     assert np.any(lifted & pushing[:, None])
     assert np.all(rise[lifted & pushing[:, None]] > settings.swing_clearance - POSITION_TOLERANCE)
+
+
+@pytest.mark.parametrize("motion", ["barrel_roll", "front_flip"])
+def test_a_foot_leaves_the_ground_from_rest(planner, robot, motion):
+    plan = planner.plan(MotionRequest(motion=motion)).plan
+    data = robot.model.createData()
+    leaving = plan.contact[:-1] & ~plan.contact[1:]
+    assert leaving.all(axis=1).sum() == 0
+    assert np.all(leaving.any(axis=0))
+    for k, i in np.argwhere(leaving):
+        pin.forwardKinematics(robot.model, data, plan.q[k + 1], plan.v[k + 1])
+        frame = robot.contact_frames[i]
+        velocity = pin.getFrameVelocity(robot.model, data, frame, pin.LOCAL_WORLD_ALIGNED).linear
+        np.testing.assert_allclose(velocity, 0.0, atol=1e-6)
+
+
+def test_a_refined_phase_has_finer_steps_and_lasts_as_long(planner):
+    plan = planner.plan(MotionRequest(motion="barrel_roll")).plan
+    phases = load_motion("barrel_roll").take_off
+    steps = [
+        np.full(round(phase.refinement * phase.duration / planner.settings.dt), phase.refinement) for phase in phases
+    ]
+    expected = planner.settings.dt / np.concatenate(steps)
+    assert len(set(expected)) > 1
+    np.testing.assert_allclose(np.diff(plan.time)[: len(expected)], expected)
+    assert plan.take_off_time == pytest.approx(sum(phase.duration for phase in phases))
 
 
 def test_a_roll_to_the_other_side_lands_on_the_other_side(planner):
@@ -158,7 +186,8 @@ def test_the_robot_lands_level_at_the_goal_heading(case):
     wanted, result = case
     miss = rotation.multiply(rotation.about_z(-wanted.yaw), result.plan.q[-1, BASE_ORIENTATION])
     assert np.rad2deg(np.linalg.norm(rotation.log(miss))) < 3.0
-    assert result.report.rotation_deg[2] == pytest.approx(np.rad2deg(wanted.yaw), abs=5.0)
+    if wanted.motion == "jump":  # else the turn about another axis shares in the sum about this one
+        assert result.report.rotation_deg[2] == pytest.approx(np.rad2deg(wanted.yaw), abs=5.0)
 
 
 def test_exact_torques_are_within_the_limits(case):

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from aerial_model.compiled import cholesky, cholesky_solve
 from aerial_model.plan_file import save_plan
-from aerial_wbic.compiled import cholesky, cholesky_solve
 
 ROUNDING = 1e-10
 TICKS_OF_EVERYTHING = Path(__file__).with_name("ticks_of_everything.py")

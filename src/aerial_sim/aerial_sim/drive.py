@@ -2,12 +2,37 @@
 
 from __future__ import annotations
 
-import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 
+from aerial_model import actuator
 from aerial_model.actuator import ActuatorLaw
+from aerial_model.compiled import compiled
 from aerial_model.state import Command
+
+_voltage_of = compiled(actuator.voltage_of)
+_torque_bounds_of = compiled(actuator.torque_bounds_of)
+
+
+class _Law(NamedTuple):
+    """What the drives need of the actuator law, arrays ``(n,)``, and of the battery."""
+
+    torque_max: np.ndarray
+    bus_voltage: np.ndarray
+    volts_per_torque: np.ndarray
+    volts_per_speed: np.ndarray
+    amperes_per_torque: np.ndarray  # of the motor [A/(N·m)]
+    battery_resistance: float  # [Ω]
+
+
+class _Period(NamedTuple):
+    """The record of one control period."""
+
+    requested: np.ndarray  # (n,) sum over the physics steps so far [N·m]
+    delivered: np.ndarray  # (n,) the same [N·m]
+    peaks: np.ndarray  # (2,) largest ratios of requested torque and of the voltage it needs
+    current: np.ndarray  # (1,) drawn from the battery in the last physics step [A]
 
 
 class Drive:
@@ -20,25 +45,27 @@ class Drive:
     """
 
     def __init__(self, law: ActuatorLaw, steps: int, battery_resistance: float = 0.0) -> None:
-        self._law = law
-        self._battery_resistance = battery_resistance
-        self._current = 0.0  # drawn from the battery in the last physics step [A]
-        shape = (steps, len(law.torque_max))
-        self._requested = np.zeros(shape)  # [N·m]
-        self._delivered = np.zeros(shape)  # [N·m]
-        self._speed = np.zeros(shape)  # [rad/s]
+        n = len(law.torque_max)
+        names = ("torque_max", "bus_voltage", "volts_per_torque", "volts_per_speed")
+        amperes_per_torque = 1.0 / (law.torque_constant * law.gear_ratio)
+        arrays = [np.array(getattr(law, name), dtype=float) for name in names]
+        self._law = _Law(*arrays, amperes_per_torque, float(battery_resistance))
+        self._steps = steps
+        self._period = _Period(np.zeros(n), np.zeros(n), np.zeros(2), np.zeros(1))
+        nothing = Command(**dict.fromkeys(("torque", "position", "velocity", "stiffness", "damping"), np.zeros(n)))
+        self.torque(0, nothing, np.zeros(n), np.zeros(n))  # compiles what no tick may
+        self.clear()
 
     def clear(self) -> None:
         """Forget the period."""
-        self._current = 0.0
-        for record in (self._requested, self._delivered, self._speed):
+        for record in self._period:
             record[:] = 0.0
 
     def torque(self, step: int, command: Command, position: np.ndarray, speed: np.ndarray) -> np.ndarray:
         """Return the torque ``(n,)`` [N·m] delivered in physics step number ``step`` of the period.
 
         Args:
-            step: counted from 0.
+            step: counted from 0, with which a period begins.
             command: set-points that hold for the period.
             position: joint positions ``(n,)`` [rad].
             speed: joint velocities ``(n,)`` [rad/s].
@@ -46,39 +73,64 @@ class Drive:
         Raises:
             ValueError: if the command does not amount to finite torques.
         """
-        requested = command.requested_torque(position, speed)
-        if step == 0 and not np.isfinite(requested).all():
+        set_points = command.torque, command.position, command.velocity, command.stiffness, command.damping
+        delivered, finite = _deliver(step, set_points, position, speed, self._law, self._period)
+        if step == 0 and not finite:
+            requested = command.requested_torque(position, speed)
             raise ValueError(f"a command must ask for finite torques, found {requested}")
-        law = self._sagging_law() if self._battery_resistance else self._law
-        delivered = law.available(requested, speed)
-        if self._battery_resistance:
-            power = law.voltage(delivered, speed) @ (delivered / (law.torque_constant * law.gear_ratio))
-            self._current = max(float(power), 0.0) / float(self._law.bus_voltage.mean())
-        self._requested[step] = requested
-        self._delivered[step] = delivered
-        self._speed[step] = speed
         return delivered
-
-    def _sagging_law(self) -> ActuatorLaw:
-        voltage = self._law.bus_voltage - self._battery_resistance * self._current
-        return dataclasses.replace(self._law, bus_voltage=np.maximum(voltage, 0.0))
 
     @property
     def requested_torque(self) -> np.ndarray:
         """Mean over the period of what was asked for, before any limit ``(n,)`` [N·m]."""
-        return self._requested.mean(axis=0)
+        return self._period.requested / self._steps
 
     @property
     def delivered_torque(self) -> np.ndarray:
         """Mean over the period of what the motors gave ``(n,)`` [N·m]."""
-        return self._delivered.mean(axis=0)
+        return self._period.delivered / self._steps
 
     @property
     def peak_torque_ratio(self) -> float:
         """Largest requested torque over its limit, over joints and physics steps."""
-        return float(self._law.torque_ratio(self._requested).max())
+        return float(self._period.peaks[0])
 
     @property
     def peak_voltage_ratio(self) -> float:
         """Largest voltage the requested torque needs over the bus voltage, over joints and physics steps."""
-        return float(self._law.voltage_ratio(self._requested, self._speed).max())
+        return float(self._period.peaks[1])
+
+
+@compiled
+def _deliver(
+    step: int, set_points: tuple, position: np.ndarray, speed: np.ndarray, law: _Law, period: _Period
+) -> tuple:
+    """Return the torque ``(n,)`` of one physics step, added to the period's record, and whether all of it is finite.
+
+    The battery's voltage is down by what the last step's current cost.
+    """
+    torque, position_set, speed_set, stiffness, damping = set_points
+    if step == 0:
+        period.requested[:] = 0.0
+        period.delivered[:] = 0.0
+        period.peaks[:] = 0.0
+    delivered = np.empty(len(torque))
+    finite = True
+    power = 0.0
+    for j in range(len(torque)):
+        requested = torque[j] + stiffness[j] * (position_set[j] - position[j]) + damping[j] * (speed_set[j] - speed[j])
+        finite &= np.isfinite(requested)
+        bus_voltage = max(law.bus_voltage[j] - law.battery_resistance * period.current[0], 0.0)
+        least, most = _torque_bounds_of(
+            speed[j], law.torque_max[j], bus_voltage, law.volts_per_torque[j], law.volts_per_speed[j]
+        )
+        delivered[j] = max(min(requested, most), least)
+        voltage = _voltage_of(delivered[j], speed[j], law.volts_per_torque[j], law.volts_per_speed[j])
+        power += voltage * delivered[j] * law.amperes_per_torque[j]
+        needed = _voltage_of(requested, speed[j], law.volts_per_torque[j], law.volts_per_speed[j])
+        period.requested[j] += requested
+        period.delivered[j] += delivered[j]
+        period.peaks[0] = max(period.peaks[0], abs(requested) / law.torque_max[j])
+        period.peaks[1] = max(period.peaks[1], abs(needed) / law.bus_voltage[j])
+    period.current[0] = max(power, 0.0) / law.bus_voltage.mean()
+    return delivered, finite

@@ -15,8 +15,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from aerial_model import rotation
 from aerial_model.actuator import ActuatorLaw
+from aerial_model.compiled import compiled, exp_of, product_of, quaternion, vector
 from aerial_model.errors import ConfigurationError
 from aerial_model.robot import Robot
 
@@ -81,7 +81,7 @@ class Sensors:
     def orientation(self, attitude: np.ndarray) -> np.ndarray:
         """Return the reported attitude ``(4,)`` of a base with the true one ``(4,)``, quaternions xyzw."""
         error = self._attitude_bias + self._uniform(3, self._noise.attitude_noise)
-        return rotation.multiply(attitude, rotation.exp(error))
+        return _turned(attitude, error)
 
     def angular_velocity(self, velocity: np.ndarray) -> np.ndarray:
         """Return the gyro's reading ``(3,)`` [rad/s] in B."""
@@ -122,4 +122,10 @@ class Sensors:
         return self._random.choice([-1.0, 1.0], n)
 
     def _uniform(self, n: int, size: float) -> np.ndarray:
-        return self._random.uniform(-size, size, n)
+        return size * (2.0 * self._random.random(n) - 1.0)
+
+
+@compiled
+def _turned(attitude: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """Return a quaternion ``(4,)`` turned by a rotation vector ``(3,)`` [rad] in the body."""
+    return np.array(product_of(quaternion(attitude), exp_of(vector(error))))

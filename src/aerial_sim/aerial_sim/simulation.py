@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 
 from aerial_model import rotation
+from aerial_model.compiled import compiled, matrix_of
 from aerial_model.errors import ConfigurationError
 from aerial_model.robot import (
     BASE_ANGULAR,
@@ -31,7 +32,7 @@ from aerial_sim.contacts import ContactSensing
 from aerial_sim.drive import Drive
 from aerial_sim.ground_truth import GroundTruth
 from aerial_sim.sensors import SensorNoise, Sensors
-from aerial_sim.world import XYZW, World, build
+from aerial_sim.world import World, build
 
 CONTROL_DT = 0.002  # [s]
 FLAT = Terrain()
@@ -230,11 +231,7 @@ class Simulation:
 
     def state(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the true q ``(nq,)`` and v ``(nv,)`` in Pinocchio's order, base twist in B."""
-        qpos, qvel = self._data.qpos, self._data.qvel
-        q = np.concatenate([qpos[BASE_POSITION], qpos[XYZW], qpos[self._world.joint_qpos]])
-        linear = self._R_WB().T @ qvel[BASE_LINEAR]  # MuJoCo: linear in W, angular in B
-        v = np.concatenate([linear, qvel[BASE_ANGULAR], qvel[self._world.joint_dof]])
-        return q, v
+        return _state(self._data.qpos, self._data.qvel, self._world.joint_qpos, self._world.joint_dof)
 
     def set_state(self, q: np.ndarray, v: np.ndarray) -> None:
         """Put the robot at q ``(nq,)`` and v ``(nv,)`` in Pinocchio's order; time goes on."""
@@ -286,3 +283,20 @@ class Simulation:
         model.geom_pos[self._world.ground_geoms, 2] = self._ground_height + self._ground_rise
         model.body_mass[self._world.trunk] = self._trunk_mass + self._added_mass
         mujoco.mj_setConst(model, mujoco.MjData(model))
+
+
+@compiled
+def _state(qpos: np.ndarray, qvel: np.ndarray, joint_qpos: np.ndarray, joint_dof: np.ndarray) -> tuple:
+    """Return q and v in Pinocchio's order. MuJoCo has a quaternion's w first, and the base's linear velocity in W."""
+    n = len(joint_qpos)
+    q, v = np.empty(7 + n), np.empty(6 + n)
+    q[:3] = qpos[:3]
+    q[3], q[4], q[5], q[6] = qpos[4], qpos[5], qpos[6], qpos[3]
+    rows = matrix_of((q[3], q[4], q[5], q[6]))
+    for axis in range(3):
+        v[axis] = rows[0][axis] * qvel[0] + rows[1][axis] * qvel[1] + rows[2][axis] * qvel[2]
+        v[3 + axis] = qvel[3 + axis]
+    for j in range(n):
+        q[7 + j] = qpos[joint_qpos[j]]
+        v[6 + j] = qvel[joint_dof[j]]
+    return q, v

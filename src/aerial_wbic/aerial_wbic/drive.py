@@ -8,10 +8,10 @@ import numpy as np
 
 from aerial_model import actuator
 from aerial_model.actuator import ActuatorLaw
+from aerial_model.compiled import compiled
 from aerial_model.kinematics import Configuration
 from aerial_model.robot import JOINT_VELOCITY, Robot
 from aerial_model.state import Command, Measurement
-from aerial_wbic.compiled import compiled
 from aerial_wbic.gains import ControllerGains
 from aerial_wbic.qp import Room, Solution, inverse_dynamics
 from aerial_wbic.target import PostureTarget

@@ -23,6 +23,16 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from aerial_model.compiled import (
+    cholesky,
+    cholesky_solve,
+    compiled,
+    exp_of,
+    matrix_of,
+    product_of,
+    quaternion,
+    vector,
+)
 from aerial_model.robot import (
     BASE_ANGULAR,
     BASE_LINEAR,
@@ -33,16 +43,6 @@ from aerial_model.robot import (
     Robot,
 )
 from aerial_model.state import Estimate, Measurement
-from aerial_wbic.compiled import (
-    cholesky,
-    cholesky_solve,
-    compiled,
-    exp_of,
-    matrix_of,
-    product_of,
-    quaternion,
-    vector,
-)
 from aerial_wbic.gains import EstimatorNoise
 from aerial_wbic.target import GRAVITY
 

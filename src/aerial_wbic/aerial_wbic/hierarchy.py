@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aerial_wbic.compiled import cholesky, cholesky_solve, compiled
+from aerial_model.compiled import cholesky, cholesky_solve, compiled
 
 # Eigenvalues of J H⁻¹ Jᵀ, inverse inertias [1/kg] (for momenta: [kg]).
 MOVABLE = (

@@ -19,10 +19,10 @@ import numpy as np
 import osqp
 from scipy import sparse
 
+from aerial_model.compiled import cholesky, cholesky_solve, compiled
 from aerial_model.contact import friction_pyramid
 from aerial_model.kinematics import Configuration
 from aerial_model.robot import BASE_TWIST, JOINT_VELOCITY, Robot
-from aerial_wbic.compiled import cholesky, cholesky_solve, compiled
 from aerial_wbic.gains import QpSolver
 
 _N_BASE = 6

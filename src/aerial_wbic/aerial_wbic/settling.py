@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aerial_wbic.compiled import compiled
+from aerial_model.compiled import compiled
 
 REACH = 0.84  # how far a settling from its end goes, per ẋ_0 / ω
 TIME = 8.0  # after which 99 % of an offset is gone, per 1 / ω

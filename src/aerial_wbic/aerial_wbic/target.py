@@ -11,9 +11,9 @@ import numpy as np
 
 from aerial_model import plan as plans
 from aerial_model import rotation
+from aerial_model.compiled import cholesky, cholesky_solve, compiled, exp_of, product_of, quaternion, vector
 from aerial_model.kinematics import Configuration
 from aerial_model.robot import BASE_ANGULAR, BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY
-from aerial_wbic.compiled import cholesky, cholesky_solve, compiled, exp_of, product_of, quaternion, vector
 from aerial_wbic.gains import BodyGains
 from aerial_wbic.settling import REACH, TIME, Settling, settled, settling
 

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from aerial_model.compiled import compiled, inverse_of, log_of, product_of, quaternion
 from aerial_model.kinematics import Configuration
 from aerial_model.robot import BASE_ANGULAR, BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY, Robot
-from aerial_wbic.compiled import compiled, inverse_of, log_of, product_of, quaternion
 from aerial_wbic.gains import ControllerGains, Feedback, TaskOrder
 from aerial_wbic.hierarchy import Task, prioritized, weighted
 from aerial_wbic.target import BodyTarget, WholeBodyTarget

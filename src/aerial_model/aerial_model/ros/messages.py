@@ -262,9 +262,12 @@ def command_from_message(message: JointCommand, robot: Robot) -> Command:
         ValueError: if a field does not hold one finite number for every joint.
     """
     rows = {name: np.array(getattr(message, name)) for name in _COMMAND_ROWS}
-    for name, row in rows.items():
-        if row.shape != (robot.n_joints,) or not np.isfinite(row).all():
-            raise ValueError(f"command field {name}: expected {robot.n_joints} finite numbers, found {row.tolist()}")
+    fits = all(len(row) == robot.n_joints for row in rows.values())
+    if not fits or not np.isfinite(np.concatenate(list(rows.values()))).all():
+        for name, row in rows.items():
+            if len(row) != robot.n_joints or not np.isfinite(row).all():
+                expected = f"expected {robot.n_joints} finite numbers"
+                raise ValueError(f"command field {name}: {expected}, found {row.tolist()}")
     return Command(
         state_time=from_stamp(message.state_stamp),
         state_sequence=message.state_sequence,
