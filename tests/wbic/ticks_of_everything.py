@@ -22,8 +22,8 @@ STAND, MOTION, BEND = 100, 1000, 900  # ticks
 
 
 def versions() -> dict[str, int]:
-    """Return how many versions of each of the controller's functions are compiled."""
-    modules = [module for name, module in sys.modules.items() if name.startswith("aerial_wbic")]
+    """Return how many versions of each compiled function of ours there are."""
+    modules = [module for name, module in sys.modules.items() if name.startswith("aerial_")]
     functions = {f for module in modules for f in vars(module).values() if isinstance(f, Dispatcher)}
     return {f"{f.__module__}.{f.__name__}": len(f.signatures) for f in functions}
 

@@ -21,11 +21,12 @@ from aerial_model.state import Command, Estimate, Measurement
 from aerial_wbic.acceptance import check_start
 from aerial_wbic.drive import Drive
 from aerial_wbic.estimator import Estimator
-from aerial_wbic.gains import ControllerGains
+from aerial_wbic.gains import ControllerGains, Touchdown
 from aerial_wbic.phase import FOLLOWING, Phase, Phases
 from aerial_wbic.qp import ForceOptimization, Room
 from aerial_wbic.target import GRAVITY, Fold, PostureTarget, WholeBodyTarget
 from aerial_wbic.tasks import Arrangement, Limbs, attitude_error, command
+from aerial_wbic.touchdown import ContactSense
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -63,6 +64,7 @@ class Controller:
         gains = self._gains
         self._qp = ForceOptimization(robot, gains.weight_base, gains.weight_force, gains.qp_solver)
         self._estimator = Estimator(robot, self._gains.estimator)
+        self._sense = ContactSense(robot, gains.touchdown_sensing, gains.stiction_speed)
         self._home_height = _home_height(robot, self._kinematics)
         self.reset()
         self._rehearse()
@@ -71,6 +73,7 @@ class Controller:
     def reset(self) -> None:
         """Forget estimate, plan, stop and counters; stand from the next measurement on."""
         self._estimator.reset()
+        self._sense.forget()
         self._phases = Phases(self.robot, self._gains, self._home_height)
         self._drive = Drive(self.robot, self._gains)
         self._now: tuple[Configuration, WholeBodyTarget | PostureTarget | None] | None = (
@@ -85,6 +88,7 @@ class Controller:
         self._phases.tick(measurement.time)
         self.estimate = self._estimator.update(measurement, self._phases.contacts())
         state = self._kinematics.at(self.estimate.q, self.estimate.v)
+        self._feel(state, measurement)
         target = self._phases.target(state)
         self._now = (state, target)
         if not isinstance(target, WholeBodyTarget):
@@ -166,6 +170,15 @@ class Controller:
             **(self._errors() if self.phase in FOLLOWING and self._phases.time_in_plan > 0 else {}),
         )
 
+    def _feel(self, state: Configuration, measurement: Measurement) -> None:
+        """Feel for the ground in flight, if that is to end it."""
+        if self._gains.touchdown is Touchdown.TIME:
+            return
+        if self.phase is Phase.FLIGHT:
+            self._phases.feel(self._sense.update(measurement.time, state, measurement.joint_torque))
+        else:
+            self._sense.forget()
+
     def _accelerations(self, state: Configuration, target: WholeBodyTarget) -> tuple[np.ndarray, np.ndarray]:
         """Return q̈_cmd and q̇_ref ``(nv,)`` of the tasks."""
         return command(state, target, self._limbs.joints(target.contact), self._arrangement)
@@ -191,6 +204,8 @@ class Controller:
         wish = state, np.zeros(self.robot.model.nv), target.force, target.contact
         self._qp.within(Room(joints, joints), self._qp.solve(*wish), *wish)
         attitude_error(target.body.orientation, state.base_orientation)
+        for time in (0.0, 0.002):
+            self._sense.update(time, state, joints)
         Fold(state, 0.0, rate=1.0, pose=joints).at(0.0, state)
 
     def _errors(self) -> dict[str, np.ndarray]:

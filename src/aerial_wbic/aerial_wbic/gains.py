@@ -46,6 +46,21 @@ class QpSolver(StrEnum):
     DAQP = "daqp"
 
 
+class Touchdown(StrEnum):
+    """What ends the flight."""
+
+    TIME = "time"  # the planned landing time, as in the thesis
+    CONTACT = "contact"  # contacts that are felt, early or late
+
+
+class TouchdownSensing(NamedTuple):
+    """How contacts are felt in flight, for ``Touchdown.CONTACT``."""
+
+    share_of_weight: float = 0.1  # that a point bears which counts as touching
+    filter_time: float = 0.006  # time constant that takes the joint rates' noise away [s]
+    patience: float = 0.1  # after the planned landing, for which a contact is waited for [s]
+
+
 class EstimatorNoise(NamedTuple):
     """What the estimator assumes about its sources; standard deviations."""
 
@@ -87,6 +102,8 @@ class ControllerGains:
     tasks: TaskOrder = TaskOrder.WBC_A
     task_weights: TaskWeights = field(default=TaskWeights())
     qp_solver: QpSolver = QpSolver.OSQP
+    touchdown: Touchdown = Touchdown.TIME
+    touchdown_sensing: TouchdownSensing = field(default=TouchdownSensing())
 
     def __post_init__(self) -> None:
         for path, value in _numbers(self):

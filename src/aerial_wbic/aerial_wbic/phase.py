@@ -2,6 +2,7 @@
 
 The phases of a motion follow each other by time alone, as in the thesis (chapter 4): take-off and flight as planned,
 landing from the planned touchdown until the robot has come to rest, then standing. Lying down and standing up are told.
+If asked for, contacts that are felt end the flight instead: half of the points, from its apex on.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from aerial_model.errors import RefusalCode, RefusalError
 from aerial_model.kinematics import Configuration
 from aerial_model.plan import Plan
 from aerial_model.robot import Robot
-from aerial_wbic.gains import ControllerGains
+from aerial_wbic.gains import ControllerGains, Touchdown
 from aerial_wbic.target import Fold, Hold, PostureTarget, WholeBodyTarget, from_plan
 
 
@@ -49,6 +50,7 @@ class Phases:
         self._robot = robot
         self._gains = gains
         self._com_height = com_height
+        self._felt = np.zeros(robot.n_contacts, dtype=bool)  # contacts in the last tick
         self._upright_min = np.cos(gains.fall_tilt)  # vertical part of the base's z axis
         self._foot_radius = float(np.mean([point.radius for point in robot.contact_points]))
         self._all_points = np.ones(robot.n_contacts, dtype=bool)
@@ -128,11 +130,24 @@ class Phases:
             return
         if self._plan_begin is None:
             self._plan_begin = time
-        if self._plan_time >= self.plan.landing_time:
+        if self._lands():
             self._com_height = self.plan.landing_com_height
             self.phase, self._next_way = Phase.LANDING, self._to_stance
         elif self._plan_time >= self.plan.take_off_time:
             self.phase = Phase.FLIGHT
+
+    def feel(self, touching: np.ndarray) -> None:
+        """Take note of the points that are felt to bear load ``(n_c,)`` bool."""
+        self._felt = touching
+
+    def _lands(self) -> bool:
+        """Return whether the flight that the plan has is over."""
+        plan, time = self.plan, self._plan_time
+        if self._gains.touchdown is Touchdown.TIME:
+            return time >= plan.landing_time
+        down = 2 * self._felt.sum() >= len(self._felt)
+        falling = time >= (plan.take_off_time + plan.landing_time) / 2
+        return (falling and down) or time >= plan.landing_time + self._gains.touchdown_sensing.patience
 
     def contacts(self) -> np.ndarray:
         """Return the points that carry load now, by the schedule ``(n_c,)`` bool."""
@@ -143,7 +158,8 @@ class Phases:
     def target(self, state: Configuration) -> WholeBodyTarget | PostureTarget | None:
         """Return what to do now, seen where the robot is; None: nothing but to damp the joints."""
         if self.phase in FOLLOWING:
-            return from_plan(self.plan.sample(self._plan_time), self._gains.follow)
+            time = min(self._plan_time, self.plan.landing_time)  # whoever waits for a contact holds the landing pose
+            return from_plan(self.plan.sample(time), self._gains.follow)
         if self._next_way is not None:
             self._way, self._next_way = self._next_way(state), None
         if isinstance(self._way, Hold) and state.R_WB[2, 2] < self._upright_min:
