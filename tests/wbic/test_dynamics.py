@@ -11,7 +11,6 @@ from aerial_model.kinematics import Kinematics
 from aerial_model.robot import BASE_ANGULAR, BASE_LINEAR, JOINT_POSITION, JOINT_VELOCITY
 from aerial_model.terrain import Terrain
 from aerial_sim import world
-from aerial_wbic.gains import QpSolver
 from aerial_wbic.qp import ForceOptimization, inverse_dynamics
 from aerial_wbic.target import shared_load
 from aerial_wbic.tasks import Arrangement, Limbs, command
@@ -42,7 +41,7 @@ def built(robot):
 @pytest.fixture
 def answer(robot, gains):
     """q̈, forces and torques of one tick that asks for a push, which one or two feet cannot give, with a tilted base."""
-    optimization = ForceOptimization(robot, gains.weight_base, gains.weight_force, QpSolver.OSQP)
+    optimization = ForceOptimization(robot, gains.weight_base, gains.weight_force)
     limbs, arrangement = Limbs(robot), Arrangement.of(gains)
 
     def answer(state, target_at, contact):

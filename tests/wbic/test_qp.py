@@ -13,6 +13,7 @@ from aerial_model.contact import friction_pyramid
 from aerial_model.robot import BASE_TWIST
 from aerial_wbic.gains import QpSolver
 from aerial_wbic.qp import ForceOptimization, Room, Solution, inverse_dynamics
+from aerial_wbic.qp_solvers import SOLVERS
 from aerial_wbic.target import shared_load
 
 EQUATION_TOLERANCE = 1e-8  # [N], [N·m]
@@ -29,7 +30,7 @@ any_state = settings(suppress_health_check=[HealthCheck.function_scoped_fixture]
 
 @pytest.fixture(params=QpSolver)
 def optimization(robot, gains, request):
-    return ForceOptimization(robot, gains.weight_base, gains.weight_force, request.param)
+    return ForceOptimization(robot, gains.weight_base, gains.weight_force, SOLVERS[request.param])
 
 
 def problem(state, seed):
@@ -143,7 +144,7 @@ def test_commanded_forces_that_fit_are_taken(optimization, state_at):
 @pytest.mark.parametrize("solver", QpSolver)
 def test_equal_input_gives_equal_output(robot, gains, state_at, solver):
     def run() -> list[Solution]:
-        optimization = ForceOptimization(robot, gains.weight_base, gains.weight_force, solver)
+        optimization = ForceOptimization(robot, gains.weight_base, gains.weight_force, SOLVERS[solver])
         states = [(state_at(seed), seed) for seed in range(5)]
         return [optimization.solve(state, *problem(state, seed), np.ones(4, dtype=bool)) for state, seed in states]
 

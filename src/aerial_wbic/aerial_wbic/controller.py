@@ -24,6 +24,7 @@ from aerial_wbic.estimator import Estimator
 from aerial_wbic.gains import ControllerGains, Touchdown
 from aerial_wbic.phase import FOLLOWING, Phase, Phases
 from aerial_wbic.qp import ForceOptimization, Room
+from aerial_wbic.qp_solvers import SOLVERS
 from aerial_wbic.target import GRAVITY, Fold, PostureTarget, WholeBodyTarget
 from aerial_wbic.tasks import Arrangement, Limbs, attitude_error, command
 from aerial_wbic.touchdown import ContactSense
@@ -62,7 +63,7 @@ class Controller:
         self._arrangement = Arrangement.of(self._gains)
         self._kinematics = Kinematics(robot)
         gains = self._gains
-        self._qp = ForceOptimization(robot, gains.weight_base, gains.weight_force, gains.qp_solver)
+        self._qp = ForceOptimization(robot, gains.weight_base, gains.weight_force, SOLVERS[gains.qp_solver])
         self._estimator = Estimator(robot, self._gains.estimator)
         self._sense = ContactSense(robot, gains.touchdown_sensing, gains.stiction_speed)
         self._home_height = _home_height(robot, self._kinematics)

@@ -3,48 +3,25 @@
     min δ_qᵀ Q_1 δ_q + δ_fᵀ Q_2 δ_f
     s.t. S_fb (H q̈ + C q̇ + G) = S_fb J_cᵀ f_r,   q̈ = q̈_cmd + [δ_q; 0],   f_r = f_cmd + δ_f,   W f_r ≥ 0.
 
-OSQP is set up once for every number of loaded points; the sparsity never changes, a tick updates numbers and starts
-from the last solution. Its penalty does not adapt to what it met before, so that equal input gives equal output to the
-last bit. A fixed penalty converges only on a well scaled problem: the variables are √Q_1 δ_q and √Q_2 δ_f, and the rows of the equations of motion
-are multiplied by √Q_1 H_bb⁻¹, so that cost and equality are both of unit size. DAQP, the other solver there is, gets the
-same problem without δ_q: the equations of motion give it from δ_f.
+A solver is set up once for every number of loaded points; the sparsity never changes, a tick updates numbers. The problem
+is scaled, as a fixed penalty needs it to converge: the variables are √Q_1 δ_q and √Q_2 δ_f, and the rows of the equations
+of motion are multiplied by √Q_1 H_bb⁻¹, so that cost and equality are both of unit size.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-import daqp
 import numpy as np
-import osqp
 from scipy import sparse
 
 from aerial_model.compiled import cholesky, cholesky_solve, compiled
 from aerial_model.contact import friction_pyramid
 from aerial_model.kinematics import Configuration
 from aerial_model.robot import BASE_TWIST, JOINT_VELOCITY, Robot
-from aerial_wbic.gains import QpSolver
+from aerial_wbic.qp_solvers import INFINITY, N_BASE, Osqp, QpFactory
 
-_N_BASE = 6
 _LEVER = 0.2  # [m] by which torques are divided, so that their rows are as large as those of forces
-_INFINITY = osqp.constant("OSQP_INFTY")
-_SETTINGS = {
-    "verbose": False,
-    "scaling": 0,  # done here
-    "adaptive_rho": False,
-    "alpha": 1.2,
-    "eps_abs": 1e-4,
-    "eps_rel": 1e-5,
-    "check_termination": 5,
-    "warm_starting": True,
-    "polishing": False,
-}
-# Penalties tried in this order, found on recorded jumps and on random problems: the first takes 20 iterations in the
-# median and over 70 in 1 % of a jump's ticks, the second solves what is far from what the ground can give.
-_USUAL = {"rho": 6.0, "max_iter": 150}
-_HARD = {"rho": 100.0, "max_iter": 2500}  # up to 1 ms
-_DAQP_SOLVED = 1
-_ACCEPTED = (osqp.SolverStatus.OSQP_SOLVED, osqp.SolverStatus.OSQP_SOLVED_INACCURATE)
 
 
 class Solution(NamedTuple):
@@ -69,10 +46,10 @@ class ForceOptimization:
         robot: gives the number of contacts and the friction coefficient.
         weight_base: Q_1, the same for all six rows.
         weight_force: Q_2, the same for all forces.
-        solver: that finds the optimum.
+        solver: makes what finds the optimum.
     """
 
-    def __init__(self, robot: Robot, weight_base: float, weight_force: float, solver: QpSolver = QpSolver.OSQP) -> None:
+    def __init__(self, robot: Robot, weight_base: float, weight_force: float, solver: QpFactory = Osqp) -> None:
         pyramid = friction_pyramid(robot.friction_coefficient)
         numbers = range(1, robot.n_contacts + 1)
         self._programs = [_Program(n, 0, pyramid, weight_base, weight_force, solver) for n in numbers]
@@ -129,25 +106,25 @@ class _Program:
     """
 
     def __init__(
-        self, n: int, n_limits: int, pyramid: np.ndarray, weight_base: float, weight_force: float, solver: QpSolver
+        self, n: int, n_limits: int, pyramid: np.ndarray, weight_base: float, weight_force: float, solver: QpFactory
     ) -> None:
         self._pyramid = pyramid
         self._root_base, self._root_force = float(np.sqrt(weight_base)), float(np.sqrt(weight_force))
-        variables, limits = _N_BASE + 3 * n, _N_BASE + len(pyramid) * n
+        variables, limits = N_BASE + 3 * n, N_BASE + len(pyramid) * n
         rows = limits + n_limits
         A = np.zeros((rows, variables))
-        A[:_N_BASE, :_N_BASE] = np.eye(_N_BASE)
-        A[:_N_BASE, _N_BASE:] = 1.0  # dense: changes with the state
-        A[_N_BASE:limits, _N_BASE:] = np.kron(np.eye(n), pyramid) / self._root_force
+        A[:N_BASE, :N_BASE] = np.eye(N_BASE)
+        A[:N_BASE, N_BASE:] = 1.0  # dense: changes with the state
+        A[N_BASE:limits, N_BASE:] = np.kron(np.eye(n), pyramid) / self._root_force
         A[limits:] = 1.0  # dense: changes with the state
         self._A = sparse.csc_matrix(A)
         column = np.repeat(np.arange(variables), np.diff(self._A.indptr))
-        changing = (self._A.indices < _N_BASE) & (column >= _N_BASE)
-        self._changing = np.flatnonzero(changing).reshape(3 * n, _N_BASE)  # by column
+        changing = (self._A.indices < N_BASE) & (column >= N_BASE)
+        self._changing = np.flatnonzero(changing).reshape(3 * n, N_BASE)  # by column
         self._limits = np.flatnonzero(self._A.indices >= limits).reshape(variables, n_limits)  # by column
         self._lower = np.zeros(rows)
-        self._upper = np.full(rows, _INFINITY)
-        self._solver = _SOLVERS[solver](self._A, self._lower, self._upper)
+        self._upper = np.full(rows, INFINITY)
+        self._solver = solver(self._A, self._lower, self._upper)
 
     def solve(
         self,
@@ -169,108 +146,6 @@ class _Program:
         return None if x is None else x / root_force
 
 
-class _Osqp:
-    """OSQP, set up once for all problems of one sparsity."""
-
-    def __init__(self, A: sparse.csc_matrix, lower: np.ndarray, upper: np.ndarray) -> None:
-        rows, variables = A.shape
-        self._nothing = np.zeros(variables), np.zeros(rows)
-        self._solver = osqp.OSQP()
-        P = sparse.eye(variables, format="csc")
-        self._solver.setup(P, self._nothing[0], A, lower, upper, **_SETTINGS, **_USUAL)
-        self._core = self._solver._solver  # OSQP itself: the wrapper's bookkeeping takes longer than the solution
-
-    def minimum(self, A: sparse.csc_matrix, lower: np.ndarray, upper: np.ndarray) -> np.ndarray | None:
-        """Return √Q_2 δ_f; None if OSQP gives up also with the second penalty."""
-        self._core.update_data_vec(q=None, l=lower, u=upper)
-        self._core.update_data_mat(P_x=None, P_i=None, A_x=A.data, A_i=None)
-        x = self._attempt()
-        if x is None:
-            self._solver.update_settings(**_HARD)
-            x = self._attempt()
-            self._solver.update_settings(**_USUAL)
-        if x is None:
-            x, y = self._nothing
-            self._solver.warm_start(x=x, y=y)
-            return None
-        return x[_N_BASE:]
-
-    def _attempt(self) -> np.ndarray | None:
-        """Return the variables that OSQP finds; None if it gives up."""
-        self._core.solve()
-        if self._core.info.status_val not in _ACCEPTED:
-            return None
-        x = self._core.solution.x
-        return x if np.isfinite(x).all() else None
-
-
-class _Daqp:
-    """DAQP, an active-set method, on the problem of the forces alone; every problem from nothing."""
-
-    def __init__(self, A: sparse.csc_matrix, lower: np.ndarray, upper: np.ndarray) -> None:
-        self._sense = np.zeros(len(lower) - _N_BASE, dtype=np.int32)  # inequalities
-
-    def minimum(self, A: sparse.csc_matrix, lower: np.ndarray, upper: np.ndarray) -> np.ndarray | None:
-        """Return √Q_2 δ_f; None if DAQP finds none, or the problem is not finite."""
-        problem = reduced(A.data, A.indices, A.indptr, lower, upper)
-        if not np.isfinite(problem.f).all():  # it would not end
-            return None
-        x, _, status, _ = daqp.solve(*problem, self._sense)
-        return x if status == _DAQP_SOLVED and np.isfinite(x).all() else None
-
-
-_SOLVERS = {QpSolver.OSQP: _Osqp, QpSolver.DAQP: _Daqp}
-
-
-class Reduced(NamedTuple):
-    """min ½ xᵀ H x + fᵀ x  s.t. lower ≤ A x ≤ upper, in the order in which DAQP takes it."""
-
-    H: np.ndarray  # (3 n, 3 n)
-    f: np.ndarray  # (3 n,)
-    A: np.ndarray  # (m, 3 n)
-    upper: np.ndarray  # (m,)
-    lower: np.ndarray  # (m,)
-
-
-@compiled
-def reduced(data: np.ndarray, indices: np.ndarray, indptr: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> Reduced:
-    """Return the problem of x = √Q_2 δ_f; the first six rows of A say y = √Q_1 δ_q = G x + g.
-
-    Args:
-        data: entries of A by columns.
-        indices: their rows.
-        indptr: where each column begins, and the end.
-        lower: least values of A's rows; the first six are equations.
-        upper: greatest values.
-    """
-    rows, n = len(lower) - _N_BASE, len(indptr) - 1 - _N_BASE
-    G, A_y = np.zeros((_N_BASE, n)), np.zeros((rows, _N_BASE))
-    A, H, f = np.zeros((rows, n)), np.eye(n), np.zeros(n)
-    above, below = upper[_N_BASE:].copy(), lower[_N_BASE:].copy()
-    for column in range(_N_BASE + n):
-        for entry in range(indptr[column], indptr[column + 1]):
-            row = indices[entry]
-            if column < _N_BASE and row >= _N_BASE:
-                A_y[row - _N_BASE, column] = data[entry]
-                above[row - _N_BASE] -= data[entry] * lower[column]
-                below[row - _N_BASE] -= data[entry] * lower[column]
-            elif column >= _N_BASE and row < _N_BASE:
-                G[row, column - _N_BASE] = -data[entry]
-                f[column - _N_BASE] -= data[entry] * lower[row]
-            elif column >= _N_BASE:
-                A[row - _N_BASE, column - _N_BASE] = data[entry]
-    for i in range(n):
-        for j in range(n):
-            for k in range(_N_BASE):
-                H[i, j] += G[k, i] * G[k, j]
-    for row in range(rows):
-        for k in range(_N_BASE):
-            if A_y[row, k] != 0.0:
-                for j in range(n):
-                    A[row, j] += A_y[row, k] * G[k, j]
-    return Reduced(H, f, A, above, below)
-
-
 @compiled
 def _state_problem(
     state: Configuration,
@@ -290,18 +165,18 @@ def _state_problem(
     The rows of the equations of motion say √Q_1 δ_q = √Q_1 H_bb⁻¹ (S_fb J_cᵀ δ_f + what f_cmd leaves missing).
     """
     loaded = np.flatnonzero(contact)
-    columns = np.empty((_N_BASE, 3 * len(loaded) + 1))
+    columns = np.empty((N_BASE, 3 * len(loaded) + 1))
     for n, i in enumerate(loaded):
-        columns[:, 3 * n : 3 * n + 3] = state.J_contacts[i, :, :_N_BASE].T
+        columns[:, 3 * n : 3 * n + 3] = state.J_contacts[i, :, :N_BASE].T
     columns[:, -1] = _missing(state, vdot_cmd, f_cmd, contact)
     _solve_base(state, columns)
     for column in range(len(changing)):
-        for row in range(_N_BASE):
+        for row in range(N_BASE):
             A[changing[column, row]] = -root_base / root_force * columns[row, column]
-    lower[:_N_BASE] = upper[:_N_BASE] = root_base * columns[:, -1]
+    lower[:N_BASE] = upper[:N_BASE] = root_base * columns[:, -1]
     rows = len(pyramid)
     for n, i in enumerate(loaded):
-        begin = _N_BASE + n * rows
+        begin = N_BASE + n * rows
         lower[begin : begin + rows] = -(pyramid @ f_cmd[i])
 
 
@@ -327,7 +202,7 @@ def _state_limits(
     n_joints = limits.shape[1]
     begin = len(lower) - n_joints
     force = np.zeros_like(f_cmd)
-    free = np.empty((_N_BASE, 1))
+    free = np.empty((N_BASE, 1))
     free[:, 0] = _missing(state, vdot_cmd, force, contact)
     _solve_base(state, free)
     for i in loaded:
@@ -336,7 +211,7 @@ def _state_limits(
     for j in range(n_joints):
         row = JOINT_VELOCITY.start + j
         without = state.M[row] @ vdot_cmd + state.nle[row]
-        for c in range(_N_BASE):
+        for c in range(N_BASE):
             A[limits[c, j]] = state.M[row, c] / (_LEVER * root_base)
             without += state.M[row, c] * free[c, 0]
         bears = False
@@ -344,12 +219,12 @@ def _state_limits(
             for k in range(3):
                 slope = state.J_contacts[i, k, row]
                 bears |= slope != 0.0
-                A[limits[_N_BASE + 3 * n + k, j]] = -slope / (_LEVER * root_force)
+                A[limits[N_BASE + 3 * n + k, j]] = -slope / (_LEVER * root_force)
         if bears:
             lower[begin + j] = (min(room.least[j], without) - torque_cmd[j]) / _LEVER
             upper[begin + j] = (max(room.greatest[j], without) - torque_cmd[j]) / _LEVER
         else:
-            lower[begin + j], upper[begin + j] = -_INFINITY, _INFINITY
+            lower[begin + j], upper[begin + j] = -INFINITY, INFINITY
 
 
 @compiled
@@ -390,7 +265,7 @@ def _outcome(
             force[i, 0] = min(max(f_cmd[i, 0], -side), side)
             force[i, 1] = min(max(f_cmd[i, 1], -side), side)
             force[i, 2] = normal
-    change = np.empty((_N_BASE, 1))
+    change = np.empty((N_BASE, 1))
     change[:, 0] = _missing(state, vdot_cmd, force, contact)
     _solve_base(state, change)
     vdot = vdot_cmd.copy()
@@ -401,7 +276,7 @@ def _outcome(
 @compiled
 def _solve_base(state: Configuration, columns: np.ndarray) -> None:
     """Replace columns ``(6, k)`` by H_bb⁻¹ times them."""
-    L = np.empty((_N_BASE, _N_BASE))
+    L = np.empty((N_BASE, N_BASE))
     cholesky(state.M[BASE_TWIST, BASE_TWIST], L)
     cholesky_solve(L, columns)
 

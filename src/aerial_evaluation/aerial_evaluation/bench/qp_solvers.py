@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 
+from aerial_evaluation.bench import qp_peers
 from aerial_evaluation.bench.samples import Row
 from aerial_evaluation.bench.subject import Subject
 from aerial_evaluation.bench.ticks import record, spread
@@ -13,6 +14,7 @@ from aerial_model.robot import Robot
 from aerial_wbic.controller import Controller
 from aerial_wbic.gains import ControllerGains, QpSolver
 from aerial_wbic.qp import ForceOptimization, Solution
+from aerial_wbic.qp_solvers import SOLVERS
 
 
 class ProblemController(Controller):
@@ -33,9 +35,12 @@ class ProblemController(Controller):
 def solvers(subject: Subject) -> list[Row]:
     """Return a row per motion and solver: its time for what the ticks with contact ask, from numbers to forces.
 
-    The solvers take turns at every problem. ``greatest_difference_n`` is that of any force to OSQP's [N].
+    Peers that are installed take part (``qp_peers``). The solvers take turns at every problem. ``greatest_difference_n`` is that of any force to OSQP's [N].
     """
     gains = subject.robot.section("controller", ControllerGains)
+    factories = {str(solver): factory for solver, factory in SOLVERS.items()} | qp_peers.installed()
+    if qp_peers.absent():
+        subject.progress(f"solvers: to compare with more, pip install {' '.join(qp_peers.absent())}")
     rows = []
     for motion in subject.motions:
         subject.progress(f"solvers of {motion}: recording")
@@ -45,11 +50,11 @@ def solvers(subject: Subject) -> list[Row]:
             pass
         problems = [problem for problem in controller.problems if problem[-1].any()]
         optimizations = {
-            solver: ForceOptimization(subject.robot, gains.weight_base, gains.weight_force, solver)
-            for solver in QpSolver
+            solver: ForceOptimization(subject.robot, gains.weight_base, gains.weight_force, factory)
+            for solver, factory in factories.items()
         }
-        times: dict[QpSolver, list[float]] = {solver: [] for solver in QpSolver}
-        found: dict[QpSolver, list[Solution]] = {solver: [] for solver in QpSolver}
+        times: dict[str, list[float]] = {solver: [] for solver in factories}
+        found: dict[str, list[Solution]] = {solver: [] for solver in factories}
         for repeat in range(subject.repeats + 1):
             subject.progress(f"solvers of {motion}: {repeat} of {subject.repeats}")
             for problem in problems:
@@ -63,7 +68,7 @@ def solvers(subject: Subject) -> list[Row]:
         rows += [
             {
                 "motion": motion,
-                "qp_solver": str(solver),
+                "qp_solver": solver,
                 "problems": len(problems),
                 "solved": sum(solution.solved for solution in found[solver]),
                 "trials": len(found[solver]),
@@ -73,6 +78,6 @@ def solvers(subject: Subject) -> list[Row]:
                     for one, other in zip(found[solver], found[QpSolver.OSQP], strict=True)
                 ),
             }
-            for solver in QpSolver
+            for solver in factories
         ]
     return rows
