@@ -33,7 +33,7 @@ def test_each_phase_lasts_as_long_as_its_motion_permits(timed):
     plan, ends = result.plan, [0.0]
     for phase in load_motion(wanted.motion).take_off:
         least, greatest = phase.duration_range
-        N = round(phase.refinement * phase.duration / PlannerSettings().dt)
+        N = round(phase.duration / PlannerSettings().dt)
         first = np.argmin(np.abs(plan.time - ends[-1]))
         steps = np.diff(plan.time[first : first + N + 1])
         np.testing.assert_allclose(steps, steps[0], rtol=1e-6)

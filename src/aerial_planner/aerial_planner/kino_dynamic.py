@@ -295,13 +295,7 @@ class KinoDynamic(Formulation):
         for k in range(N):
             loaded = schedule.contact[k]
             n_f = int(loaded.sum())
-            p = [
-                schedule.dt[k : k + 1],
-                schedule.gain_time[k : k + 1],
-                reference.com[k],
-                reference.com_velocity[k],
-                reference.orientation[k],
-            ]
+            p = [[schedule.dt], reference.com[k], reference.com_velocity[k], reference.orientation[k]]
             p += [
                 reference.joint_position[k],
                 reference.x_0[-n:],
@@ -330,7 +324,7 @@ class KinoDynamic(Formulation):
                     u_max=np.concatenate(u_max),
                 )
             )
-        p = [schedule.dt[-1:], ground[N].ravel(), [schedule.flight_time], reference.landing_com, path.parameters(0)]
+        p = [[schedule.dt], ground[N].ravel(), [schedule.flight_time], reference.landing_com, path.parameters(0)]
         T = [guess.flight_time]
         u = [guess.flight_angular_velocity[0], guess.angular_velocity[-1], T]
         shortest, longest = schedule.flight_time_range
@@ -362,7 +356,7 @@ class KinoDynamic(Formulation):
         if not self.timed:
             return (np.zeros((len(schedule.contact) + 1, 0)),) * 3
         least, greatest = np.vstack([schedule.stretch_range, schedule.stretch_range[-1:]]).T[..., None]
-        stretch = (np.append(guess.dt, guess.dt[-1]) / np.append(schedule.dt, schedule.dt[-1]))[:, None]
+        stretch = np.append(guess.dt, guess.dt[-1])[:, None] / schedule.dt
         return np.clip(stretch, least, greatest), least, greatest
 
     def _trajectory(self, schedule: Schedule, solution: Solution) -> TakeOffTrajectory:

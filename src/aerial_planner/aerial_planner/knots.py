@@ -87,10 +87,8 @@ class TakeOffKnot:
         self.stretch = ca.SX.sym("stretch", int(timed))
         self.next_stretch = ca.SX.sym("next_stretch") if timed and ends_phase else self.stretch
         self.x = ca.vertcat(self.motion, self.stretch)
-        self.nominal_dt, self.gain_time = ca.SX.sym("dt"), ca.SX.sym("gain_time")
-        self.dt, gain_time = self.nominal_dt, self.gain_time
-        if timed:
-            self.dt, gain_time = self.nominal_dt * self.stretch, self.gain_time * self.stretch
+        self.nominal_dt = ca.SX.sym("dt")
+        self.dt = self.nominal_dt * self.stretch if timed else self.nominal_dt
         # Rates are the means of the steps, those at a knot the mean of the steps before and after it.
         self.dq_next, gained = self.dq_j, self.dq_j - self.dq_before
         self.dq_end = ca.SX.sym("dq_end", int(holding_joints(model, loaded).sum()) if last else 0)
@@ -98,7 +96,7 @@ class TakeOffKnot:
             self.dq_next = 1.5 * self.dq_j - 0.5 * self.dq_before  # joints that hold nothing go on as before
             self.dq_next[np.flatnonzero(holding_joints(model, loaded)).tolist()] = self.dq_end
             gained = self.dq_next - 0.5 * (self.dq_before + self.dq_j)
-        self.ddq_j = gained / gain_time
+        self.ddq_j = gained / self.dt
         self.ddq_j_end = (self.dq_next - self.dq_j) / (0.5 * self.dt)  # of the second half of the last step, else zero
         self.foot_ref = ca.SX.sym("foot_ref", 3, n_c)
         if in_flight:
@@ -120,7 +118,6 @@ class TakeOffKnot:
         self.margin = ca.SX.sym("margin")  # share of torque and voltage limits that may be used
         self.p = ca.vertcat(
             self.nominal_dt,
-            self.gain_time,
             self.r_ref,
             self.rdot_ref,
             self.quaternion_ref,

@@ -98,7 +98,7 @@ def body_reference(
 
     stretched = ik.solve(((feet - com_0 - [0.0, 0.0, _STRETCHED_RISE * height]) @ R)[None], q_j)[0]
     N = len(schedule.contact)
-    s = np.append(0.0, np.cumsum(schedule.dt))[:, None] / schedule.take_off_time
+    s = np.linspace(0.0, 1.0, N + 1)[:, None]
     com, com_velocity = _hermite(com_0, lift_off, velocity, schedule.take_off_time, s)
     turned, turn_rate = _turn(schedule, s[:, 0])
     turn = rotation.exp(turned[:, None] * schedule.rotation)
@@ -138,8 +138,7 @@ def _foot_clearance(schedule: Schedule, settings: PlannerSettings) -> np.ndarray
 
     Without it the optimum lets them hover on the ground, where the least error of the attitude makes them push.
     """
-    lifted = np.cumsum(~schedule.contact * schedule.dt[:, None], axis=0)  # [s]
-    lifted = np.vstack([np.zeros_like(lifted[:1]), lifted])
+    lifted = schedule.dt * np.vstack([np.zeros_like(schedule.contact[:1]), np.cumsum(~schedule.contact, axis=0)])  # [s]
     return settings.swing_clearance * np.clip(lifted / settings.swing_rise_time, 0.0, 1.0)
 
 

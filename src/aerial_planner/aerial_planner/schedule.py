@@ -48,14 +48,11 @@ class Phase:
     contacts: Any  # `all`, names, or a mapping of the sense of the turn (positive, negative) to either
     duration: float  # [s]
     duration_range: tuple[float, float] | None = None  # that an optimized duration must stay in [s]; None: fixed
-    refinement: int = 1  # knots in each of the planner's time steps: more where forces change fast
 
     def __post_init__(self) -> None:
         least, greatest = self.duration_range or (self.duration, self.duration)
         if not 0 < least <= self.duration <= greatest:
             raise ValueError(f"expected 0 < least ≤ duration ≤ greatest, found {least}, {self.duration}, {greatest}")
-        if self.refinement < 1:
-            raise ValueError(f"refinement: expected 1 or more, found {self.refinement}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +78,7 @@ class Motion:
 class Schedule:
     """The discrete skeleton of one plan."""
 
-    dt: np.ndarray  # (N,) steps of the take-off [s]
+    dt: float  # of the take-off knots [s]
     contact: np.ndarray  # (N, n_c) bool: contact on [t_k, t_k+1), all of the take-off
     phase: np.ndarray  # (N,) int: which phase of the take-off
     stretch_range: np.ndarray  # (N, 2) least and greatest factor of dt, one for all of a phase, if timing is optimized
@@ -95,14 +92,7 @@ class Schedule:
     @property
     def take_off_time(self) -> float:
         """When the last contact ends [s]."""
-        return float(self.dt.sum())
-
-    @property
-    def gain_time(self) -> np.ndarray:
-        """In which the rates of each step are gained on those of the step before ``(N,)`` [s]."""
-        before = np.append(self.dt[0], self.dt[:-1])
-        before[-1] = self.dt[-1]  # the last step's are gained on the rates at its beginning
-        return 0.5 * (before + self.dt)
+        return self.dt * len(self.contact)
 
     @property
     def landing_orientation(self) -> np.ndarray:
@@ -158,7 +148,7 @@ def contact_schedule(
         request: motion and goal.
         motion: what its YAML says.
         robot: whose contact points are scheduled.
-        dt: of the take-off knots, where a phase does not refine it [s].
+        dt: of the take-off knots [s].
         flight_knots: intervals of the flight.
         least_rise: that the centre of mass must rise above its height over the ground it starts from, where the
             motion's own rule asks for less [m].
@@ -171,10 +161,8 @@ def contact_schedule(
     turns = 0.0 if rule is None else rule.turns if request.rotation is None else request.rotation
     names = [point.name for point in robot.contact_points]
     masks = np.array([_contacts(phase.contacts, names, turns) for phase in motion.take_off])
-    steps = np.array([dt / phase.refinement for phase in motion.take_off])
-    knots = np.array([max(1, round(phase.duration / h)) for phase, h in zip(motion.take_off, steps, strict=True)])
-    durations = knots * steps
-    ranges = [phase.duration_range or (T, T) for phase, T in zip(motion.take_off, durations, strict=True)]
+    knots = [max(1, round(phase.duration / dt)) for phase in motion.take_off]
+    ranges = [phase.duration_range or (n * dt, n * dt) for phase, n in zip(motion.take_off, knots, strict=True)]
     displacement = request.displacement if np.any(request.displacement) else motion.usual_displacement(turns)
     distance = float(np.linalg.norm(displacement[:2]))
     height = float(displacement[2])
@@ -185,10 +173,10 @@ def contact_schedule(
     if rule is not None:
         turn = turn + 2 * np.pi * turns * rule.axis
     return Schedule(
-        dt=np.repeat(steps, knots),
+        dt=dt,
         contact=np.repeat(masks, knots, axis=0),
         phase=np.repeat(np.arange(len(knots)), knots),
-        stretch_range=np.repeat(np.array(ranges) / durations[:, None], knots, axis=0),
+        stretch_range=np.repeat(np.array(ranges) / (dt * np.array(knots)[:, None]), knots, axis=0),
         flight_time=nominal,
         flight_time_range=(shortest, _FLIGHT_TIME_STRETCH * nominal),
         flight_knots=flight_knots,

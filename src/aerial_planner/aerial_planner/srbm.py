@@ -78,7 +78,7 @@ class SingleRigidBody(Formulation):
         share = np.array([0.0, 0.0, self.robot.mass * GRAVITY])
         pose = reference.joint_position[-1]
         return TakeOffTrajectory(
-            dt=schedule.dt,
+            dt=np.full(N, schedule.dt),
             com=reference.com,
             com_velocity=reference.com_velocity,
             angular_momentum=reference.angular_momentum,
@@ -198,7 +198,7 @@ class SingleRigidBody(Formulation):
         stages = []
         for k, loaded in enumerate(schedule.contact):
             n_f = int(loaded.sum())
-            p = [schedule.dt[k : k + 1], reference.com[k], reference.com_velocity[k], reference.orientation[k]]
+            p = [[schedule.dt], reference.com[k], reference.com_velocity[k], reference.orientation[k]]
             p += [foot_ref, reference.x_0[:13]]
             stages.append(
                 StageData.free(
@@ -234,9 +234,9 @@ class SingleRigidBody(Formulation):
         omega = np.einsum("ab,kcb,kc->ka", self.inertia_inverse, R.transpose(0, 2, 1), alpha)
         flight_R = rotation.matrix(flight[:, 3:])
         flight_omega = np.einsum("ab,kcb,kc->ka", self.inertia_inverse, flight_R.transpose(0, 2, 1), flight[:, :3])
-        rates = np.diff(q_j, axis=0) / schedule.dt[:, None]
+        rates = np.diff(q_j, axis=0) / schedule.dt
         return TakeOffTrajectory(
-            dt=schedule.dt,
+            dt=np.full(N, schedule.dt),
             com=com,
             com_velocity=x[:, 3:6],
             angular_momentum=alpha,

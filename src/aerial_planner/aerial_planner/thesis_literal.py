@@ -91,8 +91,8 @@ class LiteralProblem:
         self.R = [rotation_matrix(self.quaternion[:, k]) for k in range(K)]
         gained = self.dq_j[:, :-1] - ca.horzcat(ca.MX.zeros(n, 1), self.dq_j[:, :-2])
         gained[:, -1] = self.dq_j[:, -1] - ca.sum2(self.dq_j[:, -3:-1]) / 2  # the rates at which the contacts end
-        self.ddq_j = gained / ca.repmat(ca.DM(self.schedule.gain_time).T, n, 1)  # on each interval
-        self.ddq_j_end = (self.dq_j[:, -1] - self.dq_j[:, -2]) / (0.5 * self.schedule.dt[-1])
+        self.ddq_j = gained / self.schedule.dt  # on each interval
+        self.ddq_j_end = (self.dq_j[:, -1] - self.dq_j[:, -2]) / (0.5 * self.schedule.dt)
 
     def _objective(self) -> None:
         w, ref, cost = self.settings.weights, self.reference, ca.MX(0)
@@ -113,8 +113,8 @@ class LiteralProblem:
         self.opti.minimize(cost)
 
     def _dynamics(self) -> None:
-        mass, subject_to = self.robot.mass, self.opti.subject_to
-        for k, dt in enumerate(self.schedule.dt):
+        dt, mass, subject_to = self.schedule.dt, self.robot.mass, self.opti.subject_to
+        for k in range(self.N):
             forces = ca.reshape(self.f[:, k], 3, -1)
             centre = mean_com(self.r[:, k], self.rdot[:, k], dt)
             levers = ca.reshape(self.c[:, k], 3, -1) - ca.repmat(centre, 1, self.robot.n_contacts)
@@ -140,12 +140,12 @@ class LiteralProblem:
             omega, dq_j, alpha = self.omega[:, k], self.dq_j[:, k], self.alpha[:, k]
             if k < self.N:
                 R, q_j = self._middle(k)
-                alpha = alpha + 0.5 * self.schedule.dt[k] * self.alpha_dot[:, k]
+                alpha = alpha + 0.5 * self.schedule.dt * self.alpha_dot[:, k]
             self.opti.subject_to(alpha == R @ self.model.angular_momentum(q_j, omega, dq_j))  # (3.8)
 
     def _middle(self, k: int) -> tuple[ca.MX, ca.MX]:
         """Return attitude and joint angles at mid-interval, where a step's mean rates are the rates."""
-        half = 0.5 * self.schedule.dt[k]
+        half = 0.5 * self.schedule.dt
         turned = quaternion_product(self.quaternion[:, k], quaternion_step(self.omega[:, k], half))
         return rotation_matrix(turned), self.q_j[:, k] + half * self.dq_j[:, k]
 
@@ -290,11 +290,10 @@ class LiteralProblem:
         force = np.concatenate([guess.force, np.zeros((1, n_c, 3))])
         rddot = force.sum(axis=1) / self.robot.mass - [0.0, 0.0, GRAVITY]
         rddot[-1] = 0.0
-        steps = np.append(self.schedule.dt, self.schedule.dt[-1])
         centre = np.array(
-            [mean_com(r, rdot, dt) for r, rdot, dt in zip(guess.com, guess.com_velocity, steps, strict=True)]
+            [mean_com(r, rdot, self.schedule.dt) for r, rdot in zip(guess.com, guess.com_velocity, strict=True)]
         )[..., 0]
-        velocity = np.diff(base, axis=0) / self.schedule.dt[:, None]
+        velocity = np.diff(base, axis=0) / self.schedule.dt
         values = {
             self.base: base,
             self.quaternion: guess.orientation,
@@ -322,7 +321,7 @@ class LiteralProblem:
             return np.atleast_2d(solution.value(variable)).T
 
         return TakeOffTrajectory(
-            dt=self.schedule.dt,
+            dt=np.full(self.N, self.schedule.dt),
             com=rows(self.r),
             com_velocity=rows(self.rdot),
             angular_momentum=rows(self.alpha),

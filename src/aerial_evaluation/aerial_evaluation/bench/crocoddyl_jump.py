@@ -74,13 +74,12 @@ class Jump:
 
     def _problem(self) -> crocoddyl.ShootingProblem:
         asked = self.asked
-        kinds: dict[tuple[bytes, float], crocoddyl.ActionModelAbstract] = {}
-        steps = list(zip(self.contact, np.round(asked["dt"], 9).tolist(), strict=True))
-        for loaded, dt in steps:
-            if (loaded.tobytes(), dt) not in kinds:
-                kinds[loaded.tobytes(), dt] = self._knot(loaded, dt)
+        kinds: dict[bytes, crocoddyl.ActionModelAbstract] = {}
+        for row in self.contact:
+            if row.tobytes() not in kinds:
+                kinds[row.tobytes()] = self._knot(row, asked["dt"])
         flight = self._knot(np.zeros(len(self.frames), dtype=bool), asked["flight_time"] / asked["flight_knots"])
-        knots = [kinds[loaded.tobytes(), dt] for loaded, dt in steps] + [flight] * asked["flight_knots"]
+        knots = [kinds[row.tobytes()] for row in self.contact] + [flight] * asked["flight_knots"]
         problem = crocoddyl.ShootingProblem(self.x_0, knots, self._touchdown())
         problem.nthreads = 1  # as the planner
         return problem

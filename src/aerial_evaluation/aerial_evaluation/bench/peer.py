@@ -122,7 +122,7 @@ def _settings(subject: Subject, motion: str) -> list[PlannerSettings]:
     """Return settings by which the take-off has the ``KNOTS``."""
     usual = subject.planner.settings
     schedule = contact_schedule(usual_request(motion), load_motion(motion), subject.robot, usual.dt, usual.flight_knots)
-    return [dataclasses.replace(usual, dt=usual.dt * len(schedule.dt) / n) for n in KNOTS]
+    return [dataclasses.replace(usual, dt=schedule.take_off_time / n) for n in KNOTS]
 
 
 def _rows(subject: Subject, motion: str, settings: PlannerSettings, environment: Environment) -> list[Row]:
@@ -164,7 +164,6 @@ def problem(plan: Plan, robot: Robot, settings: PlannerSettings, repeats: int) -
         "q_start": plan.q[0],
         "q_landing": plan.q[-1],
         "contact": plan.contact[_in_take_off(plan)],
-        "dt": np.diff(plan.time)[_in_take_off(plan)[:-1]],
         "armature": law.armature,
         "torque_max": law.torque_max,
         "volts_per_torque": law.volts_per_torque,
@@ -179,6 +178,7 @@ def problem(plan: Plan, robot: Robot, settings: PlannerSettings, repeats: int) -
         "contact_frames": [point.frame for point in robot.contact_points],
         "friction": robot.friction_coefficient,
         "margin": settings.margin,
+        "dt": settings.dt,
         "flight_time": plan.landing_time - plan.take_off_time,
         "flight_knots": settings.flight_knots,
         "tolerance": _TOLERANCE,

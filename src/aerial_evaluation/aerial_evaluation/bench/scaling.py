@@ -24,7 +24,7 @@ def knots(subject: Subject) -> list[Row]:
         request = usual_request(motion)
         usual = contact_schedule(request, load_motion(motion), subject.robot, settings.dt, settings.flight_knots)
         for wanted in KNOTS:
-            dt = settings.dt * len(usual.dt) / wanted
+            dt = usual.take_off_time / wanted
             finer = dataclasses.replace(settings, dt=dt)
             planner = Planner(subject.robot, settings=finer, cache=subject.cache, actuator_tolerance=np.inf)
             subject.progress(f"knots: {motion} with {wanted}")
