@@ -202,6 +202,7 @@ def test_a_refusal_lets_time_go_on(start, until):
     held = peer.states[-1].sequence
     peer.results.publish(MotionResult(request_id="one", outcome=MotionResult.REFUSED))
     until(lambda: peer.states[-1].sequence > held + 50)
+    assert sim._session.awaited is None
 
 
 def test_time_does_not_wait_for_a_selection_that_was_refused_before_it_came(start, until):

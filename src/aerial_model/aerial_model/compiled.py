@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from aerial_model import rotation
+from aerial_model import actuator, rotation
 
 compiled = njit(cache=True, error_model="numpy")
 
@@ -17,6 +17,9 @@ product_of = compiled(rotation.product_of)
 exp_of = compiled(rotation.exp_of)
 log_of = compiled(rotation.log_of)
 matrix_of = compiled(rotation.matrix_of)
+friction_of = compiled(actuator.friction_of)
+voltage_of = compiled(actuator.voltage_of)
+torque_bounds_of = compiled(actuator.torque_bounds_of)
 
 
 @compiled

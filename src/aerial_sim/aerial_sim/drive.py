@@ -6,13 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aerial_model import actuator
 from aerial_model.actuator import ActuatorLaw
-from aerial_model.compiled import compiled
+from aerial_model.compiled import compiled, torque_bounds_of, voltage_of
 from aerial_model.state import Command
-
-_voltage_of = compiled(actuator.voltage_of)
-_torque_bounds_of = compiled(actuator.torque_bounds_of)
 
 
 class _Law(NamedTuple):
@@ -121,13 +117,13 @@ def _deliver(
         requested = torque[j] + stiffness[j] * (position_set[j] - position[j]) + damping[j] * (speed_set[j] - speed[j])
         finite &= np.isfinite(requested)
         bus_voltage = max(law.bus_voltage[j] - law.battery_resistance * period.current[0], 0.0)
-        least, most = _torque_bounds_of(
+        least, most = torque_bounds_of(
             speed[j], law.torque_max[j], bus_voltage, law.volts_per_torque[j], law.volts_per_speed[j]
         )
         delivered[j] = max(min(requested, most), least)
-        voltage = _voltage_of(delivered[j], speed[j], law.volts_per_torque[j], law.volts_per_speed[j])
+        voltage = voltage_of(delivered[j], speed[j], law.volts_per_torque[j], law.volts_per_speed[j])
         power += voltage * delivered[j] * law.amperes_per_torque[j]
-        needed = _voltage_of(requested, speed[j], law.volts_per_torque[j], law.volts_per_speed[j])
+        needed = voltage_of(requested, speed[j], law.volts_per_torque[j], law.volts_per_speed[j])
         period.requested[j] += requested
         period.delivered[j] += delivered[j]
         period.peaks[0] = max(period.peaks[0], abs(requested) / law.torque_max[j])

@@ -6,19 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aerial_model import actuator
 from aerial_model.actuator import ActuatorLaw
-from aerial_model.compiled import compiled
+from aerial_model.compiled import compiled, friction_of, torque_bounds_of, voltage_of
 from aerial_model.kinematics import Configuration
 from aerial_model.robot import JOINT_VELOCITY, Robot
 from aerial_model.state import Command, Measurement
 from aerial_wbic.gains import ControllerGains
 from aerial_wbic.qp import Room, Solution, inverse_dynamics
 from aerial_wbic.target import PostureTarget
-
-_friction_of = compiled(actuator.friction_of)
-_voltage_of = compiled(actuator.voltage_of)
-_torque_bounds_of = compiled(actuator.torque_bounds_of)
 
 
 class _Law(NamedTuple):
@@ -110,14 +105,14 @@ def _room(
     velocity: np.ndarray, measured_velocity: np.ndarray, joint_damping: np.ndarray, share: float, law: _Law
 ) -> Room:
     """Return the torques that keep a ``share`` of the limits, less what rides along with them."""
-    least, greatest = _torque_bounds_of(
+    least, greatest = torque_bounds_of(
         measured_velocity,
         share * law.torque_max,
         share * law.bus_voltage,
         law.volts_per_torque,
         law.volts_per_speed,
     )
-    along = _friction_of(velocity, law.damping, law.dry_friction, law.stiction_speed)
+    along = friction_of(velocity, law.damping, law.dry_friction, law.stiction_speed)
     along += joint_damping * (velocity - measured_velocity)
     return Room(least - along, greatest - along)
 
@@ -136,9 +131,9 @@ def _torque(
     It is −1 if a torque is not finite.
     """
     torque = inverse_dynamics(state, solution)
-    torque += _friction_of(velocity, law.damping, law.dry_friction, law.stiction_speed)
+    torque += friction_of(velocity, law.damping, law.dry_friction, law.stiction_speed)
     requested = torque + joint_damping * (velocity - measured_velocity)
-    voltage = _voltage_of(requested, measured_velocity, law.volts_per_torque, law.volts_per_speed)
+    voltage = voltage_of(requested, measured_velocity, law.volts_per_torque, law.volts_per_speed)
     saturated = 0
     for j in range(len(torque)):
         if not np.isfinite(torque[j]):

@@ -15,16 +15,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aerial_model import actuator
-from aerial_model.compiled import cholesky, cholesky_solve, compiled
+from aerial_model.compiled import cholesky, cholesky_solve, compiled, friction_of
 from aerial_model.kinematics import Configuration
 from aerial_model.robot import JOINT_VELOCITY, Robot
 from aerial_wbic.gains import TouchdownSensing
 from aerial_wbic.target import GRAVITY
 
 _REGULARIZATION = 1e-4  # [m²] keeps forces of stretched legs small instead of undefined
-
-_friction_of = compiled(actuator.friction_of)
 
 
 class _Losses(NamedTuple):
@@ -81,7 +78,7 @@ def _felt(
     """Draw the residual ``(n,)`` to what this period shows; return the contact forces ``(n_c, 3)`` [N] in W behind it."""
     speed = state.v[JOINT_VELOCITY]
     shown = state.M[JOINT_VELOCITY] @ vdot + state.nle[JOINT_VELOCITY] - torque
-    shown += _friction_of(speed, losses.damping, losses.dry_friction, losses.stiction_speed)
+    shown += friction_of(speed, losses.damping, losses.dry_friction, losses.stiction_speed)
     residual += share * (shown - residual)
     n_c, n = len(state.J_contacts), len(residual)
     J = np.empty((3 * n_c, n))

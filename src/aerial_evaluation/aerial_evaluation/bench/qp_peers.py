@@ -1,7 +1,6 @@
 """Solvers that the controller does not use, on its quadratic programs: what a benchmark compares with.
 
-They get the problem of the forces alone, as DAQP does, and the figures they need to be as accurate. Whoever is not
-installed is left out.
+They get the problem of the forces alone, as DAQP does. Whoever is not installed is left out.
 """
 
 from __future__ import annotations

@@ -35,7 +35,8 @@ class ProblemController(Controller):
 def solvers(subject: Subject) -> list[Row]:
     """Return a row per motion and solver: its time for what the ticks with contact ask, from numbers to forces.
 
-    Peers that are installed take part (``qp_peers``). The solvers take turns at every problem. ``greatest_difference_n`` is that of any force to OSQP's [N].
+    Peers that are installed take part (``qp_peers``). The solvers take turns at every problem.
+    ``greatest_difference_n`` is that of any force to OSQP's [N].
     """
     gains = subject.robot.section("controller", ControllerGains)
     factories = {str(solver): factory for solver, factory in SOLVERS.items()} | qp_peers.installed()

@@ -156,8 +156,8 @@ class SimNode(AerialNode):
     def _pace(self) -> None:
         """Publish states at absolute deadlines, each computed as soon as the command for the one before was there.
 
-        Physics and measurement thus take nothing of the time a command has. A state that came out late shifts what follows: the controller has its period, counted from the state, whatever
-        the machine does to this thread.
+        Physics and measurement thus take nothing of the time a command has. A state that came out late shifts what
+        follows: the controller has its period, counted from the state, whatever the machine does to this thread.
         """
         period = self._session.simulation.control_dt
         deadline = time.monotonic()
