@@ -25,6 +25,7 @@ from aerial_operator.nodes import CONTROLLER, PLANNER, PROGRAMS, SIMULATOR, Node
 
 WARMING_UP = "warming up"  # how the planner's diagnostics begin then
 DISCOVERY_TIMEOUT = 8.0  # for a listener to be found, on a machine whose cores are busy [s]
+ACQUAINTANCE_TIMEOUT = 2.0  # for a first word of those who will answer: they know then that we listen [s]
 PLANNING_TIMEOUT = 15.0  # for a first answer; a planner that has just started builds its problems first [s]
 START_TIMEOUT = (
     15.0  # from plan to motion; nodes that have just started must find each other first, however busy the cores [s]
@@ -135,6 +136,7 @@ class Client(Node):
         server = CONTROLLER if request.motion in list(ControllerCommand) else PLANNER
         if not self.wait(lambda: self._listens(server.name), DISCOVERY_TIMEOUT):
             raise _timeout(f"no {server.name} is running: nobody would answer; start one with ./aerial up")
+        self.wait(lambda: self._heard(server) and self._heard(CONTROLLER), ACQUAINTANCE_TIMEOUT)
         self._results.clear()
         selected = time.monotonic()
         self._selections.publish(selection_to_message(request))
@@ -182,6 +184,10 @@ class Client(Node):
 
     def _listens(self, name: str) -> bool:
         return any(end.node_name == name for end in self.get_subscriptions_info_by_topic("motion_selection"))
+
+    def _heard(self, program: NodeProgram) -> bool:
+        """Return whether a node has said anything: it learnt of our other subscriptions, made first, before that."""
+        return program.name in self.diagnostics or (program is CONTROLLER and self.status is not None)
 
     def _on_result(self, message: MotionResult) -> None:
         known = {(result.request_id, result.outcome) for _, result in self._results}
