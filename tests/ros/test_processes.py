@@ -115,7 +115,7 @@ def test_a_goal_3_m_away_is_refused_and_the_robot_stands_on(jumped, client, stan
 
 
 def test_a_plan_with_a_nan_is_refused_and_the_robot_stands_on(jumped, client, recorder, stands_on):
-    (plan,) = recorder.messages("motion_plan")
+    plan, *_ = recorder.messages("motion_plan")  # the planner repeats it until the controller answers
     plan.request_id = "nan"
     plan.q[40] = np.nan
     publisher = client.create_publisher(MotionPlan, "motion_plan", qos.EVENT)
