@@ -14,6 +14,6 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
     ],
-    package_data={PACKAGE: ["robots/*/*.urdf", "robots/*/*.yaml", "robots/*/meshes/*"]},
+    package_data={PACKAGE: ["robots/*/*.urdf", "robots/*/*.yaml", "robots/*/meshes/*", "robots/*/motions/*"]},
     zip_safe=False,
 )

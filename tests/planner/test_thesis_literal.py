@@ -33,7 +33,7 @@ def both(request, robot):
     wanted, variant = request.param
     settings, model = PlannerSettings(), base_frame_model(robot)
     ik = InverseKinematics(robot, model)
-    schedule = contact_schedule(wanted, load_motion(wanted.motion), robot, settings.dt, settings.flight_knots)
+    schedule = contact_schedule(wanted, load_motion(wanted.motion, robot), robot, settings.dt, settings.flight_knots)
     reference = body_reference(schedule, robot.standing_configuration(), robot, model, ik, settings)
     guess, _ = SingleRigidBody(robot, model, ik, settings, SolverOptions()).solve(schedule, reference)
     stage = KinoDynamic(robot, model, settings, variant, SolverOptions())

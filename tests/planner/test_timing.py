@@ -28,10 +28,10 @@ def timed(request, planner):
     return request.param, planner.plan(request.param)
 
 
-def test_each_phase_lasts_as_long_as_its_motion_permits(timed):
+def test_each_phase_lasts_as_long_as_its_motion_permits(timed, robot):
     wanted, result = timed
     plan, ends = result.plan, [0.0]
-    for phase in load_motion(wanted.motion).take_off:
+    for phase in load_motion(wanted.motion, robot).take_off:
         least, greatest = phase.duration_range
         N = round(phase.duration / PlannerSettings().dt)
         first = np.argmin(np.abs(plan.time - ends[-1]))
@@ -70,7 +70,7 @@ def test_a_timed_flip_lands_level(timed):
 
 def test_no_fixed_duration_is_cheaper(planner, robot, timed):
     wanted, result = timed
-    stage, schedule = planner._stage(wanted), planner._schedule(wanted, load_motion(wanted.motion))
+    stage, schedule = planner._stage(wanted), planner._schedule(wanted, load_motion(wanted.motion, robot))
     reference = body_reference(
         schedule, robot.standing_configuration(), robot, planner._model, planner._ik, planner.settings
     )

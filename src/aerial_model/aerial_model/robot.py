@@ -1,11 +1,17 @@
-"""A robot is data: a folder with ``robot.urdf`` and ``robot.yaml``; Pinocchio, CasADi and MuJoCo models all come from it."""
+"""A robot is data: a folder with ``robot.urdf`` and ``robot.yaml``; Pinocchio, CasADi and MuJoCo models all come from it.
+
+What the folder holds beyond that is optional: ``extends`` makes it a variant of another, ``urdf`` names a file elsewhere,
+``motions/`` has motions of its own.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import hashlib
-from collections.abc import Mapping
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
@@ -14,10 +20,12 @@ import numpy as np
 import pinocchio as pin
 
 from aerial_model.actuator import ActuatorLaw
-from aerial_model.config import check_keys, closest, from_mapping, frozen_array, load_yaml
-from aerial_model.contact import ContactPoint
+from aerial_model.config import check_keys, closest, from_mapping, frozen_array, load_yaml, merged
+from aerial_model.contact import ContactPoint, holding_rows
 from aerial_model.errors import ConfigurationError
+from aerial_model.robot_description import Description
 from aerial_model.rotation import IDENTITY, heading
+from aerial_model.scale import REFERENCE_HEIGHT, REFERENCE_MASS, Scale
 
 T = TypeVar("T")
 
@@ -29,9 +37,9 @@ BASE_LINEAR = slice(0, 3)  # in v
 BASE_ANGULAR = slice(3, 6)  # in v
 JOINT_VELOCITY = slice(6, None)  # in v
 
-URDF_NAME = "robot.urdf"
 YAML_NAME = "robot.yaml"
-_REQUIRED_POSES = ("home", "landing", "tuck")
+OFF_STOPS = 0.05  # that plans keep from joint stops [rad, m]: a leg that meets one lifts its foot
+USUAL_FRICTION = 0.495  # 0.7/√2: the pyramid (3.9) then lies inside the cone of the world's 0.7
 _SECTIONS = ("planner", "controller", "sensors")  # each read, as a dataclass of its own, by the package it is for
 
 
@@ -63,7 +71,8 @@ class Robot:
     """Everything that is known about a robot, loaded by ``Robot.load``."""
 
     name: str
-    folder: Path
+    folders: tuple[Path, ...]  # its own, then those it extends
+    description: Description
     model: pin.Model  # with a free-flyer base; rotor inertia as armature
     joint_names: tuple[str, ...]  # actuated joints in the order of q and v
     contact_points: tuple[ContactPoint, ...]
@@ -92,17 +101,30 @@ class Robot:
         return float(pin.computeTotalMass(self.model))
 
     @property
-    def urdf(self) -> Path:
-        """Path of the robot's URDF."""
-        return self.folder / URDF_NAME
+    def folder(self) -> Path:
+        """The robot's own folder."""
+        return self.folders[0]
+
+    @cached_property
+    def scale(self) -> Scale:
+        """How large it is beside the reference robot, to a thousandth."""
+        q = self.standing_configuration()
+        height = pin.centerOfMass(self.model, self.model.createData(), q)[2]
+        return Scale(mass=round(self.mass / REFERENCE_MASS, 3), length=round(float(height) / REFERENCE_HEIGHT, 3))
 
     def section(self, name: str, cls: type[T]) -> T:
         """Return a section of ``robot.yaml`` as the dataclass that reads it.
 
+        What the section leaves out comes from ``cls.defaults(scale)``, a mapping, if the class has it.
+
         Raises:
             ConfigurationError: for a missing or unknown key.
         """
-        return from_mapping(cls, self.sections.get(name, {}), f"{self.folder / YAML_NAME}: {name}")
+        defaults = cls.defaults(self.scale) if hasattr(cls, "defaults") else {}
+        said = self.sections.get(name, {})
+        if isinstance(said, Mapping):
+            said = merged(defaults, said)
+        return from_mapping(cls, said, f"{self.folder / YAML_NAME}: {name}")
 
     def with_section(self, name: str, **changes: Any) -> Robot:
         """Return this robot with keys of a section replaced, as ``--set section.key=value`` asks.
@@ -113,7 +135,7 @@ class Robot:
         if name not in _SECTIONS:
             known = ", ".join(_SECTIONS)
             raise ConfigurationError(f"unknown section '{name}'{closest(name, _SECTIONS)}; known: {known}")
-        sections = {**self.sections, name: {**self.sections.get(name, {}), **changes}}
+        sections = {**self.sections, name: merged(self.sections.get(name, {}), changes)}
         return dataclasses.replace(self, sections=sections)
 
     def standing_configuration(self, pose: str = "home") -> np.ndarray:
@@ -130,6 +152,22 @@ class Robot:
         data = self.model.createData()
         pin.framesForwardKinematics(self.model, data, q)
         return np.array([data.oMf[frame].translation for frame in self.contact_frames])
+
+    @property
+    def contact_links(self) -> np.ndarray:
+        """Which joint's link each contact point belongs to ``(n_c,)`` int."""
+        return np.array([self.model.frames[frame].parentJoint for frame in self.contact_frames])
+
+    @cached_property
+    def arms(self) -> np.ndarray:
+        """Indices of the joints that carry no contact point ``(n_a,)``: nothing but angular momentum needs them."""
+        carrying = {joint for link in self.contact_links for joint in self.model.supports[int(link)]}
+        joints = range(2, self.model.njoints)
+        return np.array([self.model.joints[j].idx_v - JOINT_VELOCITY.start for j in joints if j not in carrying], dtype=int)
+
+    def holding_rows(self, held: Sequence[bool]) -> tuple[tuple[int, int], ...]:
+        """Return the pairs (contact point, axis) that suffice to hold points ``(n_c,)`` still; see ``contact``."""
+        return holding_rows(self.model, self.contact_frames, held, self.poses["home"])
 
     def start_frame(self, q: np.ndarray) -> tuple[np.ndarray, float]:
         """Return the start heading frame of a robot that stands at ``q`` ``(nq,)``.
@@ -172,49 +210,74 @@ def find_folder(name_or_folder: str | Path) -> Path:
             f"no robot '{name_or_folder}'{closest(str(name_or_folder), known)}: "
             f"expected a folder or one of {', '.join(known)}"
         )
-    for name in (URDF_NAME, YAML_NAME):
-        if not (folder / name).is_file():
-            raise ConfigurationError(f"robot folder {folder}: {name} is missing")
+    if not (folder / YAML_NAME).is_file():
+        raise ConfigurationError(f"robot folder {folder}: {YAML_NAME} is missing")
     return folder.resolve()
+
+
+def _read(folder: Path) -> tuple[dict[str, Any], tuple[Path, ...]]:
+    """Return what ``robot.yaml`` says, on top of what it extends, and the folders read."""
+    folders: list[Path] = []
+    layers: list[dict[str, Any]] = []
+    while folder is not None:
+        if folder in folders:
+            raise ConfigurationError(f"{folders[0] / YAML_NAME}: extends: '{folder.name}' extends itself")
+        layer = load_yaml(folder / YAML_NAME)
+        folders.append(folder)
+        layers.append(layer)
+        parent = layer.pop("extends", None)
+        if parent is not None and not isinstance(parent, str):
+            raise ConfigurationError(f"{folder / YAML_NAME}: extends: expected a robot's name or folder, found {parent!r}")
+        if parent is not None and parent not in known_robots():
+            parent = folder / parent  # as everything a file names: relative to where it lies
+        folder = None if parent is None else find_folder(parent)
+    data: dict[str, Any] = {}
+    for layer in reversed(layers):
+        data = merged(data, layer)
+    return data, tuple(folders)
 
 
 def _load(folder: Path) -> Robot:
     where = str(folder / YAML_NAME)
-    data = load_yaml(folder / YAML_NAME)
+    data, folders = _read(folder)
     check_keys(
         data,
-        required=[
-            *("name", "contact_points", "bus_voltage", "actuators", "poses", "planning_range"),
-            "friction_coefficient",
-        ],
-        optional=["frozen_joints", *_SECTIONS],
+        required=["name", "contact_points", "bus_voltage", "actuators", "poses"],
+        optional=["urdf", "total_mass", "planning_range", "friction_coefficient", "frozen_joints", *_SECTIONS],
         where=where,
     )
-    model = _pinocchio_model(folder / URDF_NAME)
+    total_mass = None if "total_mass" not in data else _positive(data["total_mass"], f"{where}: total_mass")
+    description = Description.read(data.get("urdf"), folders, total_mass, where)
+    model = _pinocchio_model(description)
     joints = tuple(str(name) for name in model.names[2:])
     actuators = _actuator_law(data["actuators"], joints, data["bus_voltage"], where)
     model.armature = np.concatenate([np.zeros(6), actuators.armature])
     points = _contact_points(data["contact_points"], model, where)
+    frames = tuple(model.getFrameId(point.frame) for point in points)
+    poses = _poses(data, joints, where)
+    friction = data.get("friction_coefficient", USUAL_FRICTION)
     return Robot(
         name=str(data["name"]),
-        folder=folder,
+        folders=folders,
+        description=description,
         model=model,
         joint_names=joints,
         contact_points=points,
-        contact_frames=tuple(model.getFrameId(point.frame) for point in points),
+        contact_frames=frames,
         actuators=actuators,
-        poses=_poses(data, joints, where),
-        planning_range=_planning_range(data, joints, where),
+        poses=poses,
+        planning_range=_planning_range(data, joints, model, where),
         frozen_joints=_frozen_joints(data.get("frozen_joints", []), joints, where),
-        friction_coefficient=_positive(data["friction_coefficient"], f"{where}: friction_coefficient"),
-        model_hash=_content_hash(folder),
+        friction_coefficient=_positive(friction, f"{where}: friction_coefficient"),
+        model_hash=_content_hash(description, data),
         sections={name: data[name] for name in _SECTIONS if name in data},
     )
 
 
-def _pinocchio_model(urdf: Path) -> pin.Model:
+def _pinocchio_model(description: Description) -> pin.Model:
+    urdf = description.path
     try:
-        model = pin.buildModelFromUrdf(str(urdf), pin.JointModelFreeFlyer())
+        model = pin.buildModelFromXML(description.text, pin.JointModelFreeFlyer())
     except (ValueError, RuntimeError) as error:
         raise ConfigurationError(f"{urdf}: not a URDF that Pinocchio can read ({error})") from None
     for joint_id in range(2, model.njoints):
@@ -296,16 +359,27 @@ def _poses(data: Mapping[str, Any], joints: tuple[str, ...], where: str) -> dict
     poses = data["poses"]
     if not isinstance(poses, Mapping):
         raise ConfigurationError(f"{where}: poses: expected a mapping of names to joint angles, found {poses!r}")
-    for name in _REQUIRED_POSES:
-        if name not in poses:
-            raise ConfigurationError(f"{where}: poses: '{name}' is missing; required: {', '.join(_REQUIRED_POSES)}")
+    if "home" not in poses:
+        raise ConfigurationError(f"{where}: poses: 'home' is missing")
+    poses = {"landing": poses["home"], "tuck": poses["home"], **poses}
     return {
         name: _per_joint(pose, data["actuators"], joints, f"{where}: poses: {name}", ()) for name, pose in poses.items()
     }
 
 
-def _planning_range(data: Mapping[str, Any], joints: tuple[str, ...], where: str) -> tuple[np.ndarray, np.ndarray]:
-    bounds = _per_joint(data["planning_range"], data["actuators"], joints, f"{where}: planning_range", (2,))  # (n, 2)
+def _planning_range(
+    data: Mapping[str, Any], joints: tuple[str, ...], model: pin.Model, where: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return what ``planning_range`` says; joints it leaves out keep a little off the URDF's stops."""
+    stops = np.stack([model.lowerPositionLimit + OFF_STOPS, model.upperPositionLimit - OFF_STOPS], axis=1)
+    stops = stops[JOINT_POSITION]
+    said = data.get("planning_range", {})
+    kinds = data["actuators"]
+    if isinstance(said, Mapping):
+        kind_of = {joint: kind for kind, entry in kinds.items() for joint in entry["joints"]}
+        left_out = [(j, s) for j, s in zip(joints, stops, strict=True) if not {j, kind_of[j]} & set(said)]
+        said = {**said, **dict(left_out)}
+    bounds = _per_joint(said, kinds, joints, f"{where}: planning_range", (2,))  # (n, 2)
     if np.any(bounds[:, 0] >= bounds[:, 1]):
         raise ConfigurationError(f"{where}: planning_range: the first number of a pair must be the smaller one")
     return frozen_array(bounds[:, 0]), frozen_array(bounds[:, 1])
@@ -326,8 +400,7 @@ def _positive(value: Any, where: str) -> float:
     return float(value)
 
 
-def _content_hash(folder: Path) -> str:
-    digest = hashlib.sha256()
-    for name in (URDF_NAME, YAML_NAME):
-        digest.update((folder / name).read_bytes())
+def _content_hash(description: Description, data: Mapping[str, Any]) -> str:
+    digest = hashlib.sha256(description.path.read_bytes())
+    digest.update(json.dumps(data, sort_keys=True, default=str).encode())
     return digest.hexdigest()[:16]

@@ -48,7 +48,7 @@ def measure(name_or_folder: str, *, motions: Sequence[str], seconds: float, seed
     robot = Robot.load(name_or_folder)
     motions = list(motions) or motions_of(robot)
     for motion in motions:
-        load_motion(motion)  # an unknown name is one sentence before anything starts
+        load_motion(motion, robot)  # an unknown name is one sentence before anything starts
     keep_apart()
     folder.mkdir(parents=True, exist_ok=True)
     log = folder / "nodes.log"

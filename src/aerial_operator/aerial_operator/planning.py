@@ -59,14 +59,14 @@ def compile_functions(robot: Robot, motions: Iterable[str], variants: Iterable[s
         MotionRequest(motion=motion, rotation=turns, variant=variant)
         for variant in variants
         for motion in motions
-        for turns in _senses(motion)
+        for turns in _senses(motion, robot)
     ]
     return Planner(robot, cache=default_cache()).compile(requests, lambda kind: say(f"compiling {kind}"))
 
 
-def _senses(motion: str) -> list[float | None]:
+def _senses(motion: str, robot: Robot) -> list[float | None]:
     """Return what to ask of a motion so that all its contact schedules occur; None: as the motion says."""
-    wanted = load_motion(motion)
+    wanted = load_motion(motion, robot)
     if wanted.rotation is None or "rotation" not in wanted.goal:
         return [None]
     return [wanted.rotation.turns, -wanted.rotation.turns]

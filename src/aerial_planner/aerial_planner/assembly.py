@@ -14,6 +14,7 @@ from aerial_model.robot import BASE_TWIST, JOINT_VELOCITY, Robot
 from aerial_planner.flight import integrate_flight
 from aerial_planner.reference import Reference
 from aerial_planner.schedule import GRAVITY, Schedule
+from aerial_planner.settings import PlannerSettings
 from aerial_planner.symbolic import BaseFrameModel
 from aerial_planner.trajectory import TakeOffTrajectory
 
@@ -45,6 +46,7 @@ def assemble(
     schedule: Schedule,
     reference: Reference,
     take_off: TakeOffTrajectory,
+    settings: PlannerSettings,
 ) -> Plan:
     """Return the plan of an optimized take-off, in S.
 
@@ -74,6 +76,9 @@ def assemble(
         angular_momentum=take_off.angular_momentum[-1],
         joint_position=take_off.joint_position[-1],
         joint_velocity=v[-1, JOINT_VELOCITY],
+        arms=robot.arms,
+        arm_position=take_off.flight_joint_position[:, robot.arms],
+        settling_time=settings.settling_time,
         step=_FLIGHT_STEP,
     )
     t = flight.time[:, None]
@@ -116,7 +121,7 @@ def assemble(
         contact=contact,
         take_off_time=float(take_off_time[-1]),
         landing_time=float(time[-1]),
-        landing_joint_position=reference.landing_joint_position,
+        landing_joint_position=flight.joint_position[-1],
         landing_com_height=reference.landing_com_height,
         landing_support_centre=schedule.landing_centre,
         landing_yaw=schedule.landing_yaw,

@@ -75,11 +75,14 @@ def _check_solution(solution: Solution) -> None:
         )
 
 
+def attitude_miss(plan: Plan, schedule: Schedule) -> np.ndarray:
+    """Return by what rotation vector ``(3,)`` [rad], in the base at the goal, the finely integrated landing is off."""
+    landed = rotation.multiply(rotation.conjugate(schedule.landing_orientation), plan.q[-1, BASE_ORIENTATION])
+    return rotation.log(landed)
+
+
 def _check_attitude(plan: Plan, schedule: Schedule) -> None:
-    miss = rotation.log(
-        rotation.multiply(rotation.conjugate(schedule.landing_orientation), plan.q[-1, BASE_ORIENTATION])
-    )
-    angle = float(np.linalg.norm(miss))
+    angle = float(np.linalg.norm(attitude_miss(plan, schedule)))
     if angle > ATTITUDE_TOLERANCE:
         raise _refuse(f"landing attitude: {np.rad2deg(angle):.1f}° off the goal when the flight is integrated finely")
 

@@ -44,7 +44,7 @@ class CollisionModel:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self._geometry = pin.buildGeomFromUrdf(robot.model, str(robot.urdf), pin.GeometryType.COLLISION)
+        self._geometry = pin.buildGeomFromUrdfString(robot.model, robot.description.text, pin.GeometryType.COLLISION)
         self._self_pairs = self._pairs()
 
     def first_touch(self, plan: Plan) -> Touch | None:

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
+from scipy.interpolate import make_interp_spline
 
 from aerial_model import rotation
 from aerial_planner.reference import FlightPath
 from aerial_planner.symbolic import BaseFrameModel
 
-SETTLING_TIME = 0.08  # in which the joint rates of the take-off die out [s]
 _STEP = 0.005  # of the fourth-order integration [s]
 
 
@@ -35,11 +35,15 @@ def integrate_flight(
     angular_momentum: np.ndarray,
     joint_position: np.ndarray,
     joint_velocity: np.ndarray,
+    arms: np.ndarray,
+    arm_position: np.ndarray,
+    settling_time: float,
     step: float = _STEP,
 ) -> Flight:
     """Return the flight from a take-off state, by the classical Runge–Kutta rule on the quaternion.
 
     The legs follow ``path``; the joint rates they leave the ground with fade out on top of it, as no motor stops at once.
+    The arms move at the mean rates of the intervals between knots, from one to the next with constant acceleration.
 
     Args:
         model: the robot's base-frame functions.
@@ -49,12 +53,22 @@ def integrate_flight(
         angular_momentum: α ``(3,)`` in S [kg·m²/s].
         joint_position: at take-off ``(n,)`` [rad].
         joint_velocity: at take-off ``(n,)`` [rad/s].
+        arms: indices of the joints that are free in flight ``(n_a,)``.
+        arm_position: their positions at evenly spaced knots from take-off to touchdown ``(M+1, n_a)`` [rad].
+        settling_time: in which the legs' rates of the take-off die out [s].
         step: of the integration and of the returned samples [s], shortened so that it divides the flight.
     """
     n = max(1, round(duration / step))
     h = duration / n
     half_times = np.linspace(0.0, duration, 2 * n + 1)
-    q_j, dq_j = _legs(path, joint_position, joint_velocity, half_times, duration)
+    q_j, dq_j = _legs(path, joint_position, joint_velocity, half_times, duration, settling_time)
+    if len(arms) > 0:
+        dt = duration / (len(arm_position) - 1)
+        rates = np.diff(arm_position, axis=0) / dt
+        times = np.concatenate([[0.0], (np.arange(len(rates)) + 0.5) * dt, [duration]])
+        course = make_interp_spline(times, np.vstack([joint_velocity[arms], rates, rates[-1:]]), k=1)
+        dq_j[:, arms] = course(half_times)
+        q_j[:, arms] = joint_position[arms] + course.antiderivative()(half_times)
     count = len(half_times)
     inertia = np.asarray(model.inertia.map(count)(q_j.T)).T.reshape(count, 3, 3)  # symmetric
     legs_momentum = np.asarray(model.angular_momentum.map(count)(q_j.T, ca.DM.zeros(3, count), dq_j.T)).T
@@ -85,11 +99,11 @@ def integrate_flight(
 
 
 def _legs(
-    path: FlightPath, start: np.ndarray, start_rate: np.ndarray, times: np.ndarray, duration: float
+    path: FlightPath, start: np.ndarray, start_rate: np.ndarray, times: np.ndarray, duration: float, settling_time: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return joint positions and rates ``(K, n)`` along the path at ``times`` ``(K,)``."""
     position, rate = path.at(start, times, duration)
-    tau = min(SETTLING_TIME, duration)
+    tau = min(settling_time, duration)
     s = np.clip(times / tau, 0.0, 1.0)[:, None]
     position = position + tau * s * (1 - s) ** 2 * start_rate
     rate = rate + (1 - s) * (1 - 3 * s) * start_rate

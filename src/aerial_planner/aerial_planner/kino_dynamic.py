@@ -7,8 +7,8 @@ by construction; accelerations and α̇ are expressions. What stays are the mome
 
     take-off knot   x = [r, ṙ, α, quaternion, q_j, q̇_j of the knot before],   u = [ω, q̇_j, f of the loaded contacts]
     its last        x as above,   u = [as above, q̇_j at which the contacts end, of the joints that hold them]
-    lift-off knot   x as above, with these rates,   u = [ω in flight, ω on the ground, the flight time T]
-    flight knot     x = [α, quaternion, q_j, T],   u = [ω]
+    lift-off knot   x as above, with these rates,   u = [ω in flight, ω on the ground, arms' q̇_j in flight, the flight time T]
+    flight knot     x = [α, quaternion, q_j, T, arms' q̇_j of the knot before],   u = [ω, arms' q̇_j]
 
 With timing optimized, x has the factor by which the phase's time steps differ from the schedule's, constant but for the
 last knot of a phase, whose u sets that of the next; the cost of a knot is weighted with it, as an integral's would be.
@@ -18,7 +18,8 @@ legs (``knots.LegInertia``). With (3.14) alone, which neglects it, unloaded legs
 before lift-off becomes an impulse that no leg could follow.
 
 In flight the legs follow a given path from the take-off pose through the tuck to the landing pose and turn the body
-against them; because these knots are in the problem, the attitude at touchdown is the goal's, legs included.
+against them; because these knots are in the problem, the attitude at touchdown is the goal's, legs included. Arms, if
+there are any, go where the angular momentum asks them to.
 """
 
 from __future__ import annotations
@@ -159,12 +160,17 @@ class KinoDynamic(Formulation):
         else:
             feet = world_feet(self.model, s)
             lengths, slopes = link_slopes(robot, self.model, s.q_j, s.R)
+            for i, axis in robot.holding_rows(touching):
+                rows.equal("feet", feet[axis, i] - s.foot_ref[axis, i])  # (3.9a)
+            links = robot.contact_links
+            is_tip = [np.count_nonzero(links == link) == 1 for link in links]  # not one of the corners of a foot
             for i in range(n_c):
-                if touching[i]:
-                    rows.equal("feet", feet[:, i] - s.foot_ref[:, i])  # (3.9a)
+                if touching[i] and is_tip[i]:
                     rows.between("crouch", slopes[i], settings.link_slope, np.inf)
-                elif not loaded[i]:
-                    rows.between("ground", feet[2, i] - s.foot_ref[2, i], 0.0, np.inf)  # (3.10)
+                if touching[i] or loaded[i]:
+                    continue
+                rows.between("ground", feet[2, i] - s.foot_ref[2, i], 0.0, np.inf)  # (3.10)
+                if is_tip[i]:
                     # The link above the foot, too: its other end no lower than where it may stand on the foot.
                     rise = (feet[2, i] - s.foot_ref[2, i]) / lengths[i] + slopes[i]
                     rows.between("ground", rise, settings.link_slope, np.inf)
@@ -211,25 +217,39 @@ class KinoDynamic(Formulation):
         s = TakeOffKnot(robot, self.model, (False,) * robot.n_contacts, in_flight=True, timed=self.timed)
         rows = Rows()
         feet = world_feet(self.model, s)
+        holding = robot.holding_rows(touching)
+        for i, axis in holding:
+            rows.equal("feet", feet[axis, i] - s.foot_ref[axis, i])
         for i in range(robot.n_contacts):
-            if touching[i]:
-                rows.equal("feet", feet[:, i] - s.foot_ref[:, i])
-            else:
+            if not touching[i]:
                 rows.between("ground", feet[2, i] - s.foot_ref[2, i], 0.0, np.inf)
         landing = s.r + s.flight_time * s.rdot - ca.vertcat(0, 0, 0.5 * GRAVITY * s.flight_time**2)
         rows.equal("landing position", landing - s.landing_com)
-        flight = FlightKnot(s.alpha, s.quaternion, s.q_j, s.flight_time, s.omega, s.flight_p)
+        flight = FlightKnot(
+            robot,
+            alpha=s.alpha,
+            quaternion=s.quaternion,
+            q_j=s.q_j,
+            flight_time=s.flight_time,
+            omega=s.omega,
+            arm_rate=s.arm_rate,
+            arm_rate_before=s.dq_before[robot.arms.tolist()],
+            p=s.flight_p,
+            first=True,
+        )
         rows.equal("momentum", flight.momentum_gap(self.model))
+        self._arm_rows(rows, flight)
         # The rates at which the feet leave the ground: without them the last force could be an impulse no leg follows.
         rows.equal("momentum", s.R.T @ s.alpha - self.model.angular_momentum(s.q_j, s.omega_ground, s.dq_before))
-        for i, slip in enumerate(foot_velocities(self.model, s)):
-            if touching[i]:
-                rows.equal("feet", slip)
+        slip = foot_velocities(self.model, s)
+        for i, axis in holding:
+            rows.equal("feet", slip[i][axis])
         w = self.settings.weights
         cost = (
             w.angular_velocity * ca.sumsqr(s.omega)
             + w.joint_velocity * ca.sumsqr(s.dq_before)
             + w.flight_time * (s.flight_time - s.flight_time_ref) ** 2
+            + self._arm_cost(flight)
         )
         kind = rows.stage(f"lift_off_{contact_bits(touching)}_{self._name}", s.x, s.u, s.p, cost, flight.step())
         self._kinds[key] = kind
@@ -239,27 +259,60 @@ class KinoDynamic(Formulation):
         key = ("flight",)
         if key not in self._kinds:
             robot = self.robot
+            name = "flight" if len(robot.arms) == 0 else f"flight_{self.variant.name}"
             alpha, quaternion, q_j = ca.SX.sym("alpha", 3), ca.SX.sym("quat", 4), ca.SX.sym("q_j", robot.n_joints)
             T, omega, p = ca.SX.sym("T"), ca.SX.sym("omega", 3), ca.SX.sym("p", FlightKnot.n_p(robot))
+            arm_rate, before = ca.SX.sym("arm_rate", len(robot.arms)), ca.SX.sym("before", len(robot.arms))
             quaternion_ref, w = ca.SX.sym("quat_ref", 4), self.settings.weights
-            flight = FlightKnot(alpha, quaternion, q_j, T, omega, p)
+            flight = FlightKnot(
+                robot,
+                alpha=alpha,
+                quaternion=quaternion,
+                q_j=q_j,
+                flight_time=T,
+                omega=omega,
+                arm_rate=arm_rate,
+                arm_rate_before=before,
+                p=p,
+            )
             rows = Rows()
             rows.equal("momentum", flight.momentum_gap(self.model))
+            self._arm_rows(rows, flight)
             self._kinds[key] = rows.stage(
-                "flight",
-                ca.vertcat(alpha, quaternion, q_j, T),
-                omega,
+                name,
+                ca.vertcat(alpha, quaternion, q_j, T, before),
+                ca.vertcat(omega, arm_rate),
                 ca.vertcat(p, quaternion_ref),
                 w.angular_velocity * ca.sumsqr(omega)
-                + w.orientation * ca.sumsqr(attitude_error(quaternion, quaternion_ref)),
+                + w.orientation * ca.sumsqr(attitude_error(quaternion, quaternion_ref))
+                + self._arm_cost(flight),
                 flight.step(),
             )
         return self._kinds[key]
 
+    def _arm_rows(self, rows: Rows, flight: FlightKnot) -> None:
+        """Add torque limits of the arms in flight: of their inertia alone, as all that falls is without weight."""
+        arms, law = self.robot.arms, self.robot.actuators
+        if self.variant is Variant.KD or len(arms) == 0:
+            return
+        torque = ca.DM(self._leg_inertia.joint[np.ix_(arms, arms)]) @ flight.arm_acceleration
+        for row, joint in enumerate(arms):
+            limit = float(law.torque_max[joint]) * self.settings.margin
+            rows.between(f"{self.robot.joint_names[joint]} torque", torque[row] / limit, -1.0, 1.0)
+
+    def _arm_cost(self, flight: FlightKnot) -> ca.SX:
+        """Return the cost of how arms move: without one they would jump, in flight as on the ground."""
+        w, arms = self.settings.weights, self.robot.arms.tolist()
+        return (
+            w.joint_position * ca.sumsqr((flight.q_j - flight.target)[arms])
+            + w.joint_velocity * ca.sumsqr(flight.arm_rate)
+            + w.joint_acceleration * ca.sumsqr(flight.arm_acceleration)
+        )
+
     def _touchdown_kind(self) -> StageKind:
         key = ("touchdown",)
         if key not in self._kinds:
-            x = ca.SX.sym("x", 8 + self.robot.n_joints)
+            x = ca.SX.sym("x", 8 + self.robot.n_joints + len(self.robot.arms))
             goal = ca.SX.sym("goal", 4)
             rows = Rows()
             rows.attitude(x[3:7], goal)
@@ -326,10 +379,12 @@ class KinoDynamic(Formulation):
             )
         p = [[schedule.dt], ground[N].ravel(), [schedule.flight_time], reference.landing_com, path.parameters(0)]
         T = [guess.flight_time]
-        u = [guess.flight_angular_velocity[0], guess.angular_velocity[-1], T]
+        arms = robot.arms
+        arm_rate = np.diff(guess.flight_joint_position[:, arms], axis=0) * M / guess.flight_time  # (M, n_a)
+        u = [guess.flight_angular_velocity[0], guess.angular_velocity[-1], arm_rate[0], T]
         shortest, longest = schedule.flight_time_range
-        u_min = np.append(np.full(6, -np.inf), shortest)
-        u_max = np.append(np.full(6, np.inf), longest)
+        u_min = np.concatenate([np.full(6, -np.inf), -speed[arms], [shortest]])
+        u_max = np.concatenate([np.full(6, np.inf), speed[arms], [longest]])
         stages.append(
             StageData(
                 p=np.concatenate(p),
@@ -342,13 +397,18 @@ class KinoDynamic(Formulation):
             )
         )
         flight = np.hstack([guess.flight_orientation, guess.flight_joint_position])
+        x_min, x_max = (np.full(8 + n + len(arms), bound) for bound in (-np.inf, np.inf))
+        x_min[7 + arms], x_max[7 + arms] = low[arms], high[arms]
+        bounds = {"x_min": x_min, "x_max": x_max}
         for k in range(1, M + 1):
-            x_k = np.concatenate([guess.angular_momentum[-1], flight[k], T])
+            x_k = np.concatenate([guess.angular_momentum[-1], flight[k], T, arm_rate[k - 1]])
             if k < M:
                 p = np.concatenate([path.parameters(k), reference.flight_orientation[k]])
-                stages.append(StageData.free(p=p, x=x_k, u=guess.flight_angular_velocity[k]))
+                u = np.concatenate([guess.flight_angular_velocity[k], arm_rate[k]])
+                u_min = np.concatenate([np.full(3, -np.inf), -speed[arms]])
+                stages.append(StageData.free(p=p, x=x_k, u=u, u_min=u_min, u_max=-u_min, **bounds))
             else:
-                stages.append(StageData.free(p=schedule.landing_orientation, x=x_k))
+                stages.append(StageData.free(p=schedule.aim, x=x_k, **bounds))
         return stages
 
     def _stretches(self, schedule: Schedule, guess: TakeOffTrajectory) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -366,7 +426,7 @@ class KinoDynamic(Formulation):
         force = np.zeros((N, self.robot.n_contacts, 3))
         for k in range(N):
             force[k][schedule.contact[k]] = solution.u[k][3 + n :][: 3 * schedule.contact[k].sum()].reshape(-1, 3)
-        flight = np.array([x[N][6 : 13 + n], *(x_k[:-1] for x_k in solution.x[N + 1 :])])
+        flight = np.array([x[N][6 : 13 + n], *(x_k[: 7 + n] for x_k in solution.x[N + 1 :])])
         return TakeOffTrajectory(
             dt=schedule.dt * (x[:N, -1] if self.timed else np.ones(N)),
             com=x[:, :3],

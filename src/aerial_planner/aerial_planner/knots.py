@@ -102,7 +102,8 @@ class TakeOffKnot:
         if in_flight:
             self.omega_ground = ca.SX.sym("omega_ground", 3)
             self.flight_time, self.flight_time_ref = ca.SX.sym("T"), ca.SX.sym("T_ref")
-            self.u = ca.vertcat(self.omega, self.omega_ground, self.flight_time)
+            self.arm_rate = ca.SX.sym("arm_rate", len(robot.arms))
+            self.u = ca.vertcat(self.omega, self.omega_ground, self.arm_rate, self.flight_time)
             self.landing_com = ca.SX.sym("landing_com", 3)
             self.flight_p = ca.SX.sym("flight_p", FlightKnot.n_p(robot))
             landing = (self.flight_time_ref, self.landing_com, self.flight_p)
@@ -171,13 +172,34 @@ class TakeOffKnot:
 
 
 class FlightKnot:
-    """A flight interval: α constant, legs on their path, the body turning so that (3.8) holds at mid-interval."""
+    """A flight interval: α constant, legs on their path, the body turning so that (3.8) holds at mid-interval.
 
-    def __init__(self, alpha: ca.SX, quaternion: ca.SX, q_j: ca.SX, flight_time: ca.SX, omega: ca.SX, p: ca.SX) -> None:
+    Arms, joints that carry no contact point, are free: their rates ``(n_a,)`` are controls, those of the interval before
+    part of the state.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        *,
+        alpha: ca.SX,
+        quaternion: ca.SX,
+        q_j: ca.SX,
+        flight_time: ca.SX,
+        omega: ca.SX,
+        arm_rate: ca.SX,
+        arm_rate_before: ca.SX,
+        p: ca.SX,
+        first: bool = False,
+    ) -> None:
         self.alpha, self.quaternion, self.q_j, self.omega = alpha, quaternion, q_j, omega
-        self.flight_time = flight_time
+        self.flight_time, self.arm_rate = flight_time, arm_rate
         self.dt, self.fraction, self.target = p[0] * flight_time, p[1], p[2:]
         self.step_j = self.fraction * (self.target - q_j)
+        if len(robot.arms) > 0:
+            self.step_j[robot.arms.tolist()] = arm_rate * self.dt
+        # Rates are the means of intervals; before the first they are those at its beginning.
+        self.arm_acceleration = (arm_rate - arm_rate_before) / ((0.5 if first else 1.0) * self.dt)
 
     @staticmethod
     def n_p(robot: Robot) -> int:
@@ -192,12 +214,13 @@ class FlightKnot:
         )
 
     def step(self) -> ca.SX:
-        """Return α, attitude, joint angles and the flight time at the end of the interval."""
+        """Return α, attitude, joint angles, the flight time and the arms' rates at the end of the interval."""
         return ca.vertcat(
             self.alpha,
             quaternion_product(self.quaternion, quaternion_step(self.omega, self.dt)),
             self.q_j + self.step_j,
             self.flight_time,
+            self.arm_rate,
         )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from aerial_model.request import MotionRequest
 from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, Robot
 from aerial_model.state import Estimate
 from aerial_planner.assembly import ActuatorUse, actuator_use, assemble
-from aerial_planner.checks import ACTUATOR_TOLERANCE, VIOLATION_TOLERANCE, check, clearance_deficit
+from aerial_planner.checks import ACTUATOR_TOLERANCE, VIOLATION_TOLERANCE, attitude_miss, check, clearance_deficit
 from aerial_planner.collision import CollisionModel
 from aerial_planner.compiled import FunctionLibrary
 from aerial_planner.inverse_kinematics import InverseKinematics
@@ -37,6 +37,8 @@ _TOLERANCE = 3e-4  # of the optimum: tighter ones cost two iterations and gain a
 _ITERATIONS_MAX = 50  # of one solve: those that succeed take 10 to 40
 _ITERATIONS_OF_REQUEST = 100  # after which nothing else is tried, so that a refusal takes no longer than a plan
 _TIGHTENING = 0.98  # by which the optimizer's limits are lowered further than exact torques were beyond them
+_WORTH_CORRECTING = np.deg2rad(1.5)  # by which a finely integrated flight may miss its attitude [rad]
+_CORRECTABLE = np.deg2rad(30.0)  # beyond this it is another motion [rad]
 _TOUCH_RISE = 0.02  # [m] by which to fly higher when a link would touch the terrain
 _CLEARANCE_SPARE = 0.01  # [m] added to a miss, since the pose at the edge changes with the flight
 
@@ -153,7 +155,7 @@ class Planner:
 
     def warm_up(self, request: MotionRequest) -> None:
         """Build the problems of a request's schedule, so that its first plan is as fast as later ones."""
-        schedule = self._schedule(request, load_motion(request.motion))
+        schedule = self._schedule(request, load_motion(request.motion, self.robot))
         self._srbm.problem(schedule, near=True)
         self._stage(request).problem(schedule)
         if self.plans is not None:
@@ -174,7 +176,7 @@ class Planner:
             raise ValueError("a planner without a cache has nowhere to compile to")
         kinds: dict[str, StageKind] = {}
         for request in requests:
-            schedule = self._schedule(request, load_motion(request.motion))
+            schedule = self._schedule(request, load_motion(request.motion, self.robot))
             for stage in (self._srbm, self._stage(request)):
                 kinds.update((kind.name, kind) for kind in stage.kinds(schedule))
         compiled = 0
@@ -188,11 +190,11 @@ class Planner:
         self, request: MotionRequest, start: Estimate | None, progress: Progress, clock: _Clock
     ) -> PlanningResult:
         stage = self._stage(request)
-        motion = load_motion(request.motion)
+        motion = load_motion(request.motion, self.robot)
         q_start = self._start_configuration(start)
-        least_rise, margin, take_off = 0.0, self.settings.margin, None
+        least_rise, margin, take_off, correction = 0.0, self.settings.margin, None, np.zeros(3)
         while True:
-            schedule = self._schedule(request, motion, least_rise)
+            schedule = replace(self._schedule(request, motion, least_rise), correction=correction)
             reference = body_reference(schedule, q_start, self.robot, self._model, self._ik, self.settings)
             screen(request, schedule, reference, self.robot)
             if take_off is None:
@@ -201,10 +203,14 @@ class Planner:
                 take_off, solution = self._optimize(
                     stage, schedule, reference, take_off, progress, clock, margin=margin
                 )
-            plan = assemble(request, self.robot, self._model, schedule, reference, take_off)
+            plan = assemble(request, self.robot, self._model, schedule, reference, take_off, self.settings)
             use = actuator_use(plan, self.robot)
             if self._may_tighten(stage, solution, use, clock):
                 margin *= _TIGHTENING * ACTUATOR_TOLERANCE / use.worst
+                continue
+            miss = attitude_miss(plan, schedule)
+            if _WORTH_CORRECTING < np.linalg.norm(miss) < _CORRECTABLE and clock.iterations <= _ITERATIONS_OF_REQUEST:
+                correction = correction - miss
                 continue
             check(plan, schedule, solution, use, self.robot, self.actuator_tolerance)
             missing, reason = self._missing_height(plan)

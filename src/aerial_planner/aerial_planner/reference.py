@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import casadi as ca
 import numpy as np
 
 from aerial_model import rotation
@@ -21,6 +22,11 @@ _LIFT_OFF_RISE = 0.1  # of the centre of mass above its standing height, as a sh
 _STRETCHED_RISE = 0.25  # the same, at the most: the legs' longest way to the tuck starts here
 _FOLDING_SPEED = 0.55  # share of the no-load speed the legs may take; a short flight tucks less
 _SMOOTH_STEP_PEAK = 1.5  # greatest slope of the smooth step
+_LONG_SUPPORT = 0.4  # half the length of a support, over the height, that catches the robot by itself
+_DROP_MAX, _DROP_STEP = 0.2, 0.02  # by which it may land lower, as a share of the height
+_REACHED = 2e-3  # [m] that feet may miss in the landing pose
+_PUSHED = 0.3  # share of the take-off that it lasts at lift-off speed, on average
+_NEARBY = 1e-9  # [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,9 +98,10 @@ def body_reference(
     T = schedule.flight_time
     lift_off = com_0 + [0.0, 0.0, _LIFT_OFF_RISE * height]
     velocity = (landing_com - lift_off) / T + [0.0, 0.0, 0.5 * GRAVITY * T]
-    lead = settings.landing_lead * np.array([velocity[0], velocity[1], 0.0])
     R_landing = rotation.matrix(schedule.landing_orientation)
-    landing_pose = ik.solve((landing_feet + lead @ R_landing)[None], robot.poses["landing"])[0]
+    lead = _landing_lead(landing_feet @ R_landing.T, height, landing_com - lift_off, schedule, settings)
+    landing_pose, drop = _landing_pose(landing_feet + lead @ R_landing, height, robot, model, ik)
+    landing_com = landing_com - lead - [0.0, 0.0, drop]
 
     stretched = ik.solve(((feet - com_0 - [0.0, 0.0, _STRETCHED_RISE * height]) @ R)[None], q_j)[0]
     N = len(schedule.contact)
@@ -117,7 +124,7 @@ def body_reference(
         foot_position=feet,
         foot_clearance=_foot_clearance(schedule, settings),
         x_0=np.concatenate([com_0, np.zeros(6), quaternion, q_j]),
-        landing_com=landing_com - lead,
+        landing_com=landing_com,
         landing_com_height=height,
         landing_joint_position=landing_pose,
         flight_path=_flight_path(schedule, robot, stretched, landing_pose),
@@ -131,6 +138,52 @@ def _landing_stance(robot: Robot, model: BaseFrameModel) -> tuple[np.ndarray, fl
     feet = feet - [*feet[:, :2].mean(axis=0), 0.0]
     radius = np.mean([point.radius for point in robot.contact_points])
     return feet, float(radius - feet[:, 2].mean())
+
+
+def _landing_lead(
+    feet: np.ndarray, height: float, way: np.ndarray, schedule: Schedule, settings: PlannerSettings
+) -> np.ndarray:
+    """Return how far ``(3,)`` [m] the support is set ahead of the centre of mass at touchdown.
+
+    A support that is long for the height catches the robot where it lands, a little ahead. A short one has to be where
+    the robot comes to rest: a force along the line from support to centre of mass that stops the fall w also takes
+    w ℓ / h of the speed v, and as an inverted pendulum the rest would carry it √(h/g) times as far: with both,
+    ℓ = v √(h/g) / (1 + w / √(g h)).
+
+    Args:
+        feet: ``(n_c, 3)`` [m] from the centre of mass, in S.
+        height: of the centre of mass [m].
+        way: of the centre of mass from standing to over the landing place ``(3,)`` [m].
+        schedule: of the motion.
+        settings: of the planner.
+    """
+    distance, T = float(np.hypot(way[0], way[1])), schedule.flight_time
+    if distance < _NEARBY:
+        return np.zeros(3)
+    direction = np.array([way[0], way[1], 0.0]) / distance
+    half = float(np.ptp(feet @ direction)) / 2
+    falling = np.clip(1 - half / (_LONG_SUPPORT * height), 0.0, 1.0)
+    fall = abs(way[2] / T - 0.5 * GRAVITY * T)
+    stopping = np.sqrt(height / GRAVITY) / (1 + fall / np.sqrt(GRAVITY * height))
+    little = settings.landing_lead * distance / T
+    far = stopping * distance / (T + _PUSHED * schedule.take_off_time + stopping)
+    return (little + falling * max(far - little, 0.0)) * direction
+
+
+def _landing_pose(
+    feet: np.ndarray, height: float, robot: Robot, model: BaseFrameModel, ik: InverseKinematics
+) -> tuple[np.ndarray, float]:
+    """Return the pose ``(n,)`` [rad] that has the feet ``(n_c, 3)`` [m] from the centre of mass, in B, and its drop [m].
+
+    Legs that do not reach so far ahead let the centre of mass come down lower.
+    """
+    depths = np.arange(0.0, _DROP_MAX, _DROP_STEP) * height
+    targets = feet + np.array([0.0, 0.0, 1.0]) * depths[:, None, None]
+    poses = ik.solve(targets, robot.poses["landing"])
+    relative = np.array([np.asarray(model.feet(q) - ca.repmat(model.com(q), 1, len(feet))).T for q in poses])
+    missing = np.linalg.norm(relative - targets, axis=2).max(axis=1)
+    best = int(np.argmax(missing < _REACHED)) if np.any(missing < _REACHED) else int(np.argmin(missing))
+    return poses[best], float(depths[best])
 
 
 def _foot_clearance(schedule: Schedule, settings: PlannerSettings) -> np.ndarray:

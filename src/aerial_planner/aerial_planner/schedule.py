@@ -1,6 +1,8 @@
 """From a request to its contact schedule: which contact point carries load when, how long the flight is, where it ends.
 
-A motion is data: one YAML file in ``motions/``; no motion has code of its own.
+A motion is data: one YAML file in ``motions/``; no motion has code of its own. Those of this package hold for any robot:
+they name contact points by where they are, and their times and lengths, those of a Mini Cheetah, are scaled. A robot's
+folder may have ``motions/`` of its own, which come first and hold as they are.
 """
 
 from __future__ import annotations
@@ -18,10 +20,18 @@ from aerial_model.config import closest, from_mapping, load_yaml
 from aerial_model.errors import ConfigurationError, RefusalCode, RefusalError
 from aerial_model.request import MotionRequest
 from aerial_model.robot import Robot
+from aerial_model.scale import Scale, Unit
 
 GRAVITY = 9.81  # [m/s²]
 _CLEARANCE_SPARED = 0.6  # share of the clearance the optimizer may do without where it binds
 _FLIGHT_TIME_STRETCH = 1.2  # longest flight over the nominal one
+_SIDES = {"front": (0, 1), "rear": (0, -1), "left": (1, 1), "right": (1, -1)}  # axis and sign, seen from the centre
+_UNITS = {
+    "duration": Unit(time=1),
+    "duration_range": Unit(time=1),
+    "flight.clearance": Unit(length=1),
+    "displacement": Unit(length=1),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +55,7 @@ class RotationRule:
 class Phase:
     """A part of the take-off with the same contacts."""
 
-    contacts: Any  # `all`, names, or a mapping of the sense of the turn (positive, negative) to either
+    contacts: Any  # `all`, a side, names, or a mapping of the sense of the turn (positive, negative) to any of these
     duration: float  # [s]
     duration_range: tuple[float, float] | None = None  # that an optimized duration must stay in [s]; None: fixed
 
@@ -88,6 +98,7 @@ class Schedule:
     landing_centre: np.ndarray  # (3,) of the support at landing, in S, z: the surface [m]
     rotation: np.ndarray  # (3,) to accumulate from start to touchdown, as a rotation vector in S [rad]
     rotation_at_lift_off: float = 0.0  # share of it that the reference has behind it at lift-off
+    correction: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) of what to aim at, in the landed base [rad]
 
     @property
     def take_off_time(self) -> float:
@@ -100,38 +111,45 @@ class Schedule:
         return rotation.exp(self.rotation)
 
     @property
+    def aim(self) -> np.ndarray:
+        """Attitude ``(4,)`` that the optimizer is told: the landing's, corrected by what its coarse flight misses."""
+        return rotation.multiply(self.landing_orientation, rotation.exp(self.correction))
+
+    @property
     def landing_yaw(self) -> float:
         """Heading at touchdown in S [rad]."""
         return float(self.rotation[2])
 
 
 def motions_folder() -> Path:
-    """Return the folder whose YAML files are the known motions."""
+    """Return the folder whose YAML files are the motions that any robot has."""
     return Path(str(resources.files("aerial_planner"))) / "motions"
 
 
-def known_motions() -> dict[str, Path]:
-    """Return the known motions: name → file."""
-    return {path.stem: path for path in sorted(motions_folder().glob("*.yaml"))}
+def known_motions(robot: Robot) -> dict[str, Path]:
+    """Return the motions a robot has: name → file."""
+    folders = [motions_folder(), *(folder / "motions" for folder in reversed(robot.folders))]
+    return {path.stem: path for folder in folders for path in sorted(folder.glob("*.yaml"))}
 
 
-def load_motion(name: str) -> Motion:
-    """Return a motion by name.
+def load_motion(name: str, robot: Robot) -> Motion:
+    """Return a motion of a robot by name.
 
     Raises:
         RefusalError: if there is none of that name, with the names that exist.
     """
-    known = known_motions()
+    known = known_motions(robot)
     if name not in known:
         raise RefusalError(
             RefusalCode.UNKNOWN_MOTION, f"unknown motion '{name}'{closest(name, known)}; known: {', '.join(known)}"
         )
-    return _read_motion(known[name], known[name].stat().st_mtime_ns)
+    scale = robot.scale if known[name].parent == motions_folder() else Scale()
+    return _read_motion(known[name], known[name].stat().st_mtime_ns, scale)
 
 
 @lru_cache
-def _read_motion(file: Path, changed: int) -> Motion:
-    return from_mapping(Motion, load_yaml(file), str(file))
+def _read_motion(file: Path, changed: int, scale: Scale) -> Motion:
+    return from_mapping(Motion, scale.applied(load_yaml(file), _UNITS), str(file))
 
 
 def flight_time(rise: float, height: float) -> float:
@@ -159,8 +177,7 @@ def contact_schedule(
     _check_goal(request, motion)
     rule = motion.rotation
     turns = 0.0 if rule is None else rule.turns if request.rotation is None else request.rotation
-    names = [point.name for point in robot.contact_points]
-    masks = np.array([_contacts(phase.contacts, names, turns) for phase in motion.take_off])
+    masks = np.array([_contacts(phase.contacts, robot, turns) for phase in motion.take_off])
     knots = [max(1, round(phase.duration / dt)) for phase in motion.take_off]
     ranges = [phase.duration_range or (n * dt, n * dt) for phase, n in zip(motion.take_off, knots, strict=True)]
     displacement = request.displacement if np.any(request.displacement) else motion.usual_displacement(turns)
@@ -205,12 +222,19 @@ def _check_goal(request: MotionRequest, motion: Motion) -> None:
             )
 
 
-def _contacts(entry: Any, names: list[str], turns: float) -> np.ndarray:
+def _contacts(entry: Any, robot: Robot, turns: float) -> np.ndarray:
     """Return the mask ``(n_c,)`` of a phase's contacts; an entry may differ with the sense of the turn."""
+    names = [point.name for point in robot.contact_points]
     if isinstance(entry, dict):
         entry = entry["positive" if turns >= 0 else "negative"]
     if entry == "all":
         return np.ones(len(names), dtype=bool)
+    if isinstance(entry, str) and entry in _SIDES:
+        axis, sign = _SIDES[entry]
+        points = robot.contact_positions(robot.standing_configuration())  # their centre is the origin
+        return sign * points[:, axis] > 0
     if not isinstance(entry, (list, tuple)) or any(name not in names for name in entry):
-        raise ConfigurationError(f"contacts of a take-off phase: expected 'all' or some of {names}, found {entry!r}")
+        raise ConfigurationError(
+            f"contacts of a take-off phase: expected 'all', one of {', '.join(_SIDES)}, or some of {names}, found {entry!r}"
+        )
     return np.array([name in entry for name in names])

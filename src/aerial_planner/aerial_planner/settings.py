@@ -1,8 +1,31 @@
-"""The planner's numbers: one set of weights and margins for all motions of a robot (``planner`` in ``robot.yaml``)."""
+"""The planner's numbers: one set of weights and margins for all motions, and but for scale for all robots.
+
+They are those below, found on the Mini Cheetah and scaled, unless section ``planner`` of ``robot.yaml`` says otherwise.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from aerial_model.scale import Scale, Unit
+
+_UNITS = {
+    "dt": Unit(time=1),
+    "force_max": Unit(mass=1, length=1, time=-2),
+    "force_min": Unit(mass=1, length=1, time=-2),
+    "swing_clearance": Unit(length=1),
+    "swing_rise_time": Unit(time=1),
+    "landing_lead": Unit(time=1),
+    "settling_time": Unit(time=1),
+    "weights.angular_velocity": Unit(time=2),
+    "weights.joint_velocity": Unit(time=2),
+    "weights.joint_acceleration": Unit(time=4),
+    "weights.com": Unit(length=-2),
+    "weights.com_velocity": Unit(length=-2, time=2),
+    "weights.force": Unit(mass=-2, length=-2, time=4),
+    "weights.flight_time": Unit(time=-2),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,4 +66,10 @@ class PlannerSettings:
     swing_rise_time: float = 0.04  # in which a foot that has left the ground reaches it [s]
     reach: float = 0.97  # β of (3.18): share of the longest leg the single-rigid-body stage may use
     landing_lead: float = 0.05  # time by which landing feet are set ahead of the centre of mass along its velocity [s]
+    settling_time: float = 0.08  # of the legs' rates after lift-off: no motor stops at once [s]
     weights: Weights = field(default_factory=Weights)
+
+    @staticmethod
+    def defaults(scale: Scale) -> dict[str, Any]:
+        """Return what a ``robot.yaml`` need not say: the numbers above, scaled."""
+        return scale.applied(asdict(PlannerSettings()), _UNITS)

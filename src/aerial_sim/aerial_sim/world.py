@@ -78,7 +78,7 @@ def build(robot: Robot, terrain: Terrain, physics_dt: float) -> World:
         trunk_name = root.name
         model = spec.compile()
     except (ValueError, RuntimeError) as error:
-        raise ConfigurationError(f"{robot.urdf}: MuJoCo cannot use it ({' '.join(str(error).split())})") from None
+        raise ConfigurationError(f"{robot.description.path}: MuJoCo cannot use it ({' '.join(str(error).split())})") from None
     return World(
         model=model,
         terrain=terrain,
@@ -93,7 +93,7 @@ def build(robot: Robot, terrain: Terrain, physics_dt: float) -> World:
 
 def _urdf_with_looks(robot: Robot) -> str:
     """Return the URDF's text, told to keep its visual shapes and to weld fixed links onto their parents."""
-    tree = ElementTree.parse(robot.urdf).getroot()
+    tree = ElementTree.fromstring(robot.description.text)
     settings = {"discardvisual": "false", "fusestatic": "true", "meshdir": str(robot.folder), "strippath": "false"}
     ElementTree.SubElement(ElementTree.SubElement(tree, "mujoco"), "compiler", settings)
     return ElementTree.tostring(tree, encoding="unicode")

@@ -8,7 +8,7 @@ comes to rest over its feet and stands again, ready for the next.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from aerial_model import rotation
 from aerial_model.errors import RefusalCode, RefusalError
 from aerial_model.kinematics import Configuration, Kinematics
 from aerial_model.plan import Plan
+from aerial_model.posture import crouch_depth
 from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, JOINT_POSITION, Robot
 from aerial_model.state import Command, Estimate, Measurement
 from aerial_wbic.acceptance import check_start
@@ -28,6 +29,9 @@ from aerial_wbic.qp_solvers import SOLVERS
 from aerial_wbic.target import GRAVITY, Fold, PostureTarget, WholeBodyTarget
 from aerial_wbic.tasks import Arrangement, Limbs, attitude_error, command
 from aerial_wbic.touchdown import ContactSense
+
+
+_DEPTH_SHARE = 0.85  # of the depth to which legs can bend that a landing may use
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,7 +62,7 @@ class Controller:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self._gains = robot.section("controller", ControllerGains)
+        self._gains = _within_reach(robot.section("controller", ControllerGains), robot)
         self._limbs = Limbs(robot)
         self._arrangement = Arrangement.of(self._gains)
         self._kinematics = Kinematics(robot)
@@ -95,9 +99,9 @@ class Controller:
         if not isinstance(target, WholeBodyTarget):
             return self._drive.resting(target, measurement)
         vdot_cmd, v_ref = self._accelerations(state, target)
+        room = self._drive.room(v_ref, measurement)
         solution = self._qp.solve(state, vdot_cmd, target.force, target.contact)
         self._fallback_ticks += not solution.solved
-        room = self._drive.room(v_ref, measurement)
         solution = self._qp.within(room, solution, state, vdot_cmd, target.force, target.contact)
         return self._drive.command(state, solution, v_ref, measurement)
 
@@ -218,6 +222,12 @@ class Controller:
             "orientation_error": R_SW @ attitude_error(target.body.orientation, state.base_orientation),
             "angular_momentum_error": R_SW @ (target.angular_momentum - state.angular_momentum),
         }
+
+
+def _within_reach(gains: ControllerGains, robot: Robot) -> ControllerGains:
+    """Return the gains with a landing depth that the legs can bend to, feet flat."""
+    depth = _DEPTH_SHARE * crouch_depth(robot, robot.poses["landing"])
+    return replace(gains, landing_depth=min(gains.landing_depth, depth))
 
 
 def _home_height(robot: Robot, kinematics: Kinematics) -> float:

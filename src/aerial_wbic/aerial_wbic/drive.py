@@ -41,6 +41,7 @@ class Drive:
 
     def __init__(self, robot: Robot, gains: ControllerGains) -> None:
         self._law = _Law.of(robot.actuators, gains.stiction_speed)
+        self._arms = robot.arms
         n = robot.n_joints
         self._zeros = np.zeros(n)
         self._share = gains.actuator_share
@@ -63,7 +64,7 @@ class Drive:
         """
         velocity = v_ref[JOINT_VELOCITY]
         torque, saturated = _torque(
-            state, solution, velocity, measurement.joint_velocity, self._joint_damping, self._law
+            state, solution, velocity, measurement.joint_velocity, self._joint_damping, self._share, self._arms, self._law
         )
         if saturated < 0:
             return self.resting(None, measurement)
@@ -124,13 +125,19 @@ def _torque(
     velocity: np.ndarray,
     measured_velocity: np.ndarray,
     joint_damping: np.ndarray,
+    share: float,
+    arms: np.ndarray,
     law: _Law,
 ) -> tuple[np.ndarray, int]:
     """Return the feed-forward torques ``(n,)`` [N·m], and whether the boards will be asked for too much: 1, 0.
 
-    It is −1 if a torque is not finite.
+    It is −1 if a torque is not finite. Arms, which bear nothing, are asked for no more than a ``share`` of the limits.
     """
     torque = inverse_dynamics(state, solution)
+    if len(arms) > 0:
+        room = _room(velocity, measured_velocity, joint_damping, share, law)
+        for j in arms:
+            torque[j] = min(max(torque[j], room.least[j]), room.greatest[j])
     torque += friction_of(velocity, law.damping, law.dry_friction, law.stiction_speed)
     requested = torque + joint_damping * (velocity - measured_velocity)
     voltage = voltage_of(requested, measured_velocity, law.volts_per_torque, law.volts_per_speed)

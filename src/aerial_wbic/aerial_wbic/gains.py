@@ -1,11 +1,37 @@
-"""Every number and choice the controller is tuned by, section ``controller`` of ``robot.yaml``; one set for all motions."""
+"""Every number and choice the controller is tuned by: one set for all motions, and but for scale for all robots.
+
+They are those of ``gains.yaml``, scaled to the robot, unless section ``controller`` of ``robot.yaml`` says otherwise.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
+from importlib import resources
+from pathlib import Path
 from typing import Any, NamedTuple
+
+from aerial_model.config import load_yaml
+from aerial_model.scale import Scale, Unit
+
+_RATE = Unit(time=-1)
+# How numbers of gains.yaml grow with the robot. The estimator's are the sensors' and the floor's: they stay.
+_UNITS = {
+    "posture_stiffness": Unit(mass=1, length=2, time=-2),
+    "joint_damping": Unit(mass=1, length=2, time=-1),
+    "stop_damping": Unit(mass=1, length=2, time=-1),
+    "stiffness": Unit(time=-2),
+    "damping": _RATE,
+    "angular_momentum_damping": _RATE,
+    "weight_base": Unit(length=-2, time=4),
+    "weight_force": Unit(mass=-2, length=-2, time=4),
+    "settling_rate": _RATE,
+    "landing_depth": Unit(length=1),
+    "lying_height": Unit(length=1),
+    "lying_rate": _RATE,
+    "start_speed_tolerance": Unit(length=1, time=-1),
+}
 
 
 class Feedback(NamedTuple):
@@ -36,7 +62,7 @@ class TaskWeights(NamedTuple):
 
     limbs: float = 1e4  # [1/(m/s²)²], [1/(rad/s²)²]
     base: float = 100.0  # [1/(m/s²)²], [1/(rad/s²)²]
-    angular_momentum: float = 1.0  # [1/(N·m)²]
+    angular_momentum: float = 1.0  # [1/(m/s²)²]
 
 
 class QpSolver(StrEnum):
@@ -104,6 +130,11 @@ class ControllerGains:
     qp_solver: QpSolver = QpSolver.OSQP
     touchdown: Touchdown = Touchdown.TIME
     touchdown_sensing: TouchdownSensing = field(default=TouchdownSensing())
+
+    @staticmethod
+    def defaults(scale: Scale) -> dict[str, Any]:
+        """Return what a ``robot.yaml`` need not say: the reference robot's gains, scaled."""
+        return scale.applied(load_yaml(Path(str(resources.files("aerial_wbic"))) / "gains.yaml"), _UNITS)
 
     def __post_init__(self) -> None:
         for path, value in _numbers(self):

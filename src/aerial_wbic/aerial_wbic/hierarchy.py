@@ -4,7 +4,8 @@ Next to it, for comparison, all tasks at once with weights.
 
 Null-space projection with dynamically consistent inverses, thesis (3.20)–(3.23). What is left of a task under those above
 it may have any rank, zero included. Two absolute thresholds tell what it is: a relative one would take the rounding noise
-of an exhausted J N for a task and make accelerations of 1e13.
+of an exhausted J N for a task and make accelerations of 1e13. What is left but hardly moves (arms that hang straight
+down cannot turn a body about the vertical) is moved by a damped inverse: the less, the less it can do.
 """
 
 from __future__ import annotations
@@ -15,11 +16,10 @@ import numpy as np
 
 from aerial_model.compiled import cholesky, cholesky_solve, compiled
 
-# Eigenvalues of J H⁻¹ Jᵀ, inverse inertias [1/kg] (for momenta: [kg]).
-MOVABLE = (
-    1e-3  # a direction below this belongs to its task but is not accelerated: what would move a tonne is not tried
-)
+# Eigenvalues of J H⁻¹ Jᵀ, inverse inertias [1/kg].
+MOVABLE = 0.01  # a direction that moves this much less than the robot as a whole is accelerated by half of what is asked
 NOISE = 1e-9  # a direction below this is left to lower tasks
+_CERTAIN = 10.0  # times as movable: damping would change a hundredth
 EFFORT = 1e-3  # ε of weighted tasks [1/kg]: settles what none of them asks for, and hardly weighs on what they do
 
 
@@ -91,7 +91,8 @@ def consistent_inverses(J: np.ndarray, M_inv: np.ndarray) -> tuple[np.ndarray, n
     J_M_inv = J @ M_inv
     A = J_M_inv @ J.T
     L = np.empty_like(A)
-    if cholesky(A, L) > MOVABLE:  # every row adds to those before
+    enough = MOVABLE * M_inv[0, 0]
+    if cholesky(A, L) > _CERTAIN * enough:  # every row adds to those before
         cholesky_solve(L, J_M_inv)
         J_bar = np.ascontiguousarray(J_M_inv.T)
         return J_bar, J_bar, len(A)
@@ -103,7 +104,6 @@ def consistent_inverses(J: np.ndarray, M_inv: np.ndarray) -> tuple[np.ndarray, n
         if eigenvalue > NOISE:
             owned[i] = 1 / eigenvalue
             rank += 1
-        if eigenvalue > MOVABLE:
-            movable[i] = owned[i]
+            movable[i] = eigenvalue / (eigenvalue**2 + enough**2)
     Ut = np.ascontiguousarray(U.T)
     return (M_inv_Jt_U * movable) @ Ut, (M_inv_Jt_U * owned) @ Ut, rank

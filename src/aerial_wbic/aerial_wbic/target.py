@@ -11,13 +11,25 @@ import numpy as np
 
 from aerial_model import plan as plans
 from aerial_model import rotation
-from aerial_model.compiled import cholesky, cholesky_solve, compiled, exp_of, product_of, quaternion, vector
+from aerial_model.compiled import (
+    cholesky,
+    cholesky_solve,
+    compiled,
+    exp_of,
+    inverse_of,
+    log_of,
+    product_of,
+    quaternion,
+    vector,
+)
 from aerial_model.kinematics import Configuration
 from aerial_model.robot import BASE_ANGULAR, BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY
 from aerial_wbic.gains import BodyGains
 from aerial_wbic.settling import REACH, TIME, Settling, settled, settling
 
 GRAVITY = 9.81  # [m/s²]
+_SUPPORT_SHARE = 0.8  # of the support's extent that the resultant force may use
+_VERTICAL = 1e-6  # horizontal part of the base's x axis below which it has no heading
 REST_TOLERANCE = 0.2  # of the height at rest: farther off, something keeps the robot from standing
 _WRENCH_REGULARIZATION = 1e-6  # [m²] keeps the share of the load defined when the support is a line or a point
 
@@ -146,9 +158,14 @@ class _Course(NamedTuple):
 @compiled
 def _held(course: _Course, time: float, state: Configuration) -> WholeBodyTarget:
     offset, velocity, acceleration = settled(course.offset, time - course.begin)
+    com = support_centre(state) + offset
+    # The base task adds its feedback to this acceleration; the sum is what the support can give.
+    position = course.gains.position
+    feedback = position.stiffness * (com - state.com) + position.damping * (velocity - state.com_velocity)
+    acceleration = supported(state, acceleration + feedback) - feedback
     tilt, angular_velocity, angular_acceleration = settled(course.tilt, time - course.begin)
     body = BodyTarget(
-        support_centre(state) + offset,
+        com,
         velocity,
         acceleration,
         np.array(product_of(exp_of(vector(tilt)), quaternion(course.level))),
@@ -157,14 +174,19 @@ def _held(course: _Course, time: float, state: Configuration) -> WholeBodyTarget
         course.gains,
     )
     n = len(state.v) - JOINT_VELOCITY.start
-    inertia = state.A_G[:3, BASE_ANGULAR] @ state.R_WB.T  # of the robot with its joints locked, about W's axes
+    # The robot turns as one: of the angular momentum only that of joints moving beside the base is to go away.
+    inertia = np.ascontiguousarray(state.A_G[:3, BASE_ANGULAR]) @ state.R_WB.T  # with joints locked, about W's axes
+    omega = state.R_WB @ state.v[BASE_ANGULAR]
+    turn = np.array(log_of(product_of(quaternion(body.orientation), inverse_of(quaternion(state.q[BASE_ORIENTATION])))))
+    attitude = course.gains.attitude
+    turning = angular_acceleration + attitude.damping * (angular_velocity - omega) + attitude.stiffness * turn
     return WholeBodyTarget(
         body,
         state.q[JOINT_POSITION],
         np.zeros(n),
         np.zeros(n),
-        inertia @ angular_velocity,
-        inertia @ angular_acceleration,
+        inertia @ omega,
+        inertia @ turning,
         shared_load(state, acceleration),
         np.ones(len(state.contact_positions), dtype=np.bool_),
     )
@@ -195,6 +217,31 @@ class Fold:
 def support_centre(state: Configuration) -> np.ndarray:
     """Return the mean of the contact spheres' centres ``(3,)`` [m] in W."""
     return state.contact_positions.sum(axis=0) / len(state.contact_positions)
+
+
+@compiled
+def supported(state: Configuration, acceleration: np.ndarray) -> np.ndarray:
+    """Return the acceleration of the centre of mass nearest to one ``(3,)`` that the support gives without turning the body.
+
+    The line of the force through the centre of mass meets the ground within a part of the rectangle, along the heading,
+    that the contact points span; the rest is for moments. What is asked for beyond that would roll the feet over.
+    """
+    F = acceleration[2] + GRAVITY
+    arms = state.contact_positions - state.com  # (n_c, 3)
+    height = -arms[:, 2].mean()
+    if F <= 0 or height <= 0:
+        return acceleration
+    ahead = state.R_WB[:2, 0] / max(np.hypot(state.R_WB[0, 0], state.R_WB[1, 0]), _VERTICAL)
+    result = acceleration.copy()
+    for axis in range(2):
+        direction = ahead if axis == 0 else np.array([-ahead[1], ahead[0]])
+        reach = np.ascontiguousarray(arms[:, :2]) @ direction
+        middle, half = (reach.max() + reach.min()) / 2, _SUPPORT_SHARE * (reach.max() - reach.min()) / 2
+        wanted = acceleration[:2] @ direction
+        meets = -wanted * height / F  # from under the centre of mass, against the acceleration
+        allowed = min(max(meets, middle - half), middle + half)
+        result[:2] += (-allowed * F / height - wanted) * direction
+    return result
 
 
 @compiled

@@ -23,8 +23,10 @@ LINEAR = slice(3, 6)
 
 
 class Joints(NamedTuple):
-    """Indices of the joints that tasks lead: they depend on which points carry load."""
+    """What tasks lead: it depends on which points carry load."""
 
+    rank: np.ndarray  # (n_c,) how many velocities of a loaded point the points before it on its link leave open; else 0
+    mate: np.ndarray  # (n_c, 2) the first two loaded points on its link
     swinging: np.ndarray  # (n_s,) of limbs in the air
     posed: np.ndarray  # (n_p,) that a posture is asked of: arms, or all that do not swing when there are none
 
@@ -39,6 +41,7 @@ class Limbs:
             for joint in list(model.supports[model.frames[frame].parentJoint])[2:]:  # 0: universe, 1: base
                 chains[i, model.joints[joint].idx_v - JOINT_VELOCITY.start] = True
         self._chains = chains  # (n_c, n)
+        self._links = robot.contact_links
         self._joints: dict[bytes, Joints] = {}  # what was asked before
 
     def joints(self, contact: np.ndarray) -> Joints:
@@ -48,7 +51,12 @@ class Limbs:
             swinging = self._chains[~contact].any(axis=0) & ~self._chains[contact].any(axis=0)
             arms = ~self._chains.any(axis=0)
             posed = arms if arms.any() else ~swinging
-            self._joints[key] = Joints(np.flatnonzero(swinging), np.flatnonzero(posed))
+            rank, mate = np.zeros(len(contact), dtype=int), np.zeros((len(contact), 2), dtype=int)
+            for i in np.flatnonzero(contact):
+                fellows = np.flatnonzero(contact & (self._links == self._links[i]))
+                rank[i] = max(0, 3 - int(np.flatnonzero(fellows == i)[0]))
+                mate[i] = fellows[:2] if len(fellows) > 1 else i
+            self._joints[key] = Joints(rank, mate, np.flatnonzero(swinging), np.flatnonzero(posed))
         return self._joints[key]
 
 
@@ -120,7 +128,7 @@ def _task(
     statement: int, state: Configuration, target: WholeBodyTarget, joints: Joints, arrangement: Arrangement
 ) -> Task:
     if statement == Statement.LIMBS:
-        return limb_task(state, target, joints.swinging, arrangement.limbs)
+        return limb_task(state, target, joints, arrangement.limbs)
     if statement == Statement.BASE:
         return base_task(state, target.body)
     if statement == Statement.ANGULAR_MOMENTUM:
@@ -133,23 +141,55 @@ def _task(
 
 
 @compiled
-def limb_task(state: Configuration, target: WholeBodyTarget, swinging: np.ndarray, feedback: Feedback) -> Task:
+def limb_task(state: Configuration, target: WholeBodyTarget, joints: Joints, feedback: Feedback) -> Task:
     """(3.26), the first of all: loaded contact points do not accelerate, limbs in the air follow their course.
 
     A swinging limb is led in joint space, relative to the base: in the air its end effector follows from the joints
     without a singularity, and the base, which nothing can steer there, does not pull it off its course.
+
+    Of the points of one link the first gives three rows, the second what is across the line to the first, the third what
+    is across the plane of all three: together they say that the link does not move, and no row says it twice.
     """
-    rows = 3 * np.count_nonzero(target.contact) + len(swinging)
+    rows = joints.rank.sum() + len(joints.swinging)
     J = np.zeros((rows, len(state.v)))
     a, xdot = np.zeros(rows), np.zeros(rows)
     row = 0
-    for i in range(len(target.contact)):
-        if target.contact[i]:
+    for i in range(len(joints.rank)):
+        rank = joints.rank[i]
+        if rank == 3:
             J[row : row + 3] = state.J_contacts[i]
             a[row : row + 3] = -state.Jdot_v_contacts[i]
-            row += 3
-    _lead(state, target, swinging, feedback, Task(J[row:], a[row:], xdot[row:]))
+        elif rank > 0:
+            across = _across(state.contact_positions, i, joints.mate[i])[:rank]
+            first = joints.mate[i, 0]
+            J[row : row + rank] = across @ state.J_contacts[i]
+            a[row : row + rank] = -(across @ state.Jdot_v_contacts[i])
+            # Level ground bears all points of a foot; one that bears little is not put back by it.
+            rise = state.contact_positions[i, 2] - state.contact_positions[first, 2]
+            rate = (state.J_contacts[i] - state.J_contacts[first]) @ state.v
+            a[row : row + rank] -= across @ (feedback.damping * rate) + feedback.stiffness * rise * across[:, 2]
+        row += rank
+    _lead(state, target, joints.swinging, feedback, Task(J[row:], a[row:], xdot[row:]))
     return Task(J, a, xdot)
+
+
+@compiled
+def _across(points: np.ndarray, i: int, mate: np.ndarray) -> np.ndarray:
+    """Return unit vectors ``(2, 3)`` across the line from point i to the first of its link.
+
+    If i is the third of its link, the first of them is across the plane through the first two as well.
+    """
+    along = points[i] - points[mate[0]]
+    other = points[mate[1]] - points[mate[0]]
+    if i == mate[1]:  # the line is all there is: any direction that is not along it will do
+        other = np.zeros(3)
+        other[np.argmin(np.abs(along))] = 1.0
+    first = np.cross(along, other)
+    second = np.cross(along, first)
+    across = np.empty((2, 3))
+    across[0] = first / np.sqrt(first @ first)
+    across[1] = second / np.sqrt(second @ second)
+    return across
 
 
 @compiled
@@ -217,9 +257,19 @@ def _lead_com(state: Configuration, body: BodyTarget, task: Task) -> None:
 
 @compiled
 def angular_momentum_task(state: Configuration, target: WholeBodyTarget, damping: float) -> Task:
-    """(3.28)–(3.29): α̇_cmd = α̇_des + K_d,CAM (α_des − α), with no position to feed back."""
+    """(3.28)–(3.29): α̇_cmd = α̇_des + K_d,CAM (α_des − α), with no position to feed back.
+
+    It is divided by m k, with the radius of gyration k: in [m/s²]. In the air nothing changes α: to ask for it would only turn the base against the arms that try.
+    """
     alphadot = target.angular_momentum_rate + damping * (target.angular_momentum - state.angular_momentum)
-    return Task(state.A_G[ANGULAR].copy(), alphadot - state.Adot_v_G[ANGULAR], target.angular_momentum.copy())
+    if not target.contact.any():
+        alphadot = np.zeros(3)
+    # As the speed of the robot's mass at its radius of gyration: of the same size as what other tasks say.
+    inertia = (state.A_G[ANGULAR, BASE_ANGULAR] * state.R_WB).sum() / 3  # mean of those with joints locked
+    unit = np.sqrt(state.mass * inertia)
+    return Task(
+        state.A_G[ANGULAR] / unit, (alphadot - state.Adot_v_G[ANGULAR]) / unit, target.angular_momentum / unit
+    )
 
 
 @compiled

@@ -95,6 +95,6 @@ def test_motions_of_contacts_that_a_robot_does_not_have_are_none_of_its(robot):
     assert motions_of(dataclasses.replace(robot, contact_points=points)) == ("jump", "spin")
 
 
-def test_a_motion_that_would_stay_goes_forward():
-    assert usual_request("jump").displacement[0] > 0
-    assert not np.any(usual_request("spin").displacement)
+def test_a_motion_that_would_stay_goes_forward(robot):
+    assert usual_request("jump", robot).displacement[0] > 0
+    assert not np.any(usual_request("spin", robot).displacement)

@@ -24,8 +24,8 @@ def planner(robot):
 
 
 @pytest.fixture(scope="module")
-def plan(planner):
-    return planner.plan(usual_request("jump")).plan
+def plan(planner, robot):
+    return planner.plan(usual_request("jump", robot)).plan
 
 
 @pytest.fixture

@@ -44,7 +44,7 @@ class Jump:
 
     def __init__(self, asked: dict) -> None:
         self.asked = asked
-        self.model = pin.buildModelFromUrdf(asked["urdf"], pin.JointModelFreeFlyer())
+        self.model = pin.buildModelFromXML(asked["urdf"], pin.JointModelFreeFlyer())
         self.model.armature = np.concatenate([np.zeros(6), asked["armature"]])
         self.state = crocoddyl.StateMultibody(self.model)
         self.actuation = crocoddyl.ActuationModelFloatingBase(self.state)

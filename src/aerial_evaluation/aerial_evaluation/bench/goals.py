@@ -120,7 +120,7 @@ def draw(reach: np.ndarray, n: int, seed: int) -> np.ndarray:
 
 def families(robot: Robot, motion: str) -> list[Family]:
     """Return the families of goals of a motion that its file allows to set."""
-    said = load_motion(motion)
+    said = load_motion(motion, robot)
     if "displacement" not in said.goal:
         return []
     size = robot.standing_configuration()[2]  # height of the base [m]

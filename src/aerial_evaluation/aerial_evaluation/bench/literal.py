@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from aerial_evaluation.bench.samples import Row, measure, percentiles, summary
-from aerial_evaluation.bench.subject import Subject, usual_request
+from aerial_evaluation.bench.subject import Subject, usual_request, usual_schedule
 from aerial_planner.inverse_kinematics import InverseKinematics
 from aerial_planner.kino_dynamic import Variant
 from aerial_planner.reference import body_reference
-from aerial_planner.schedule import contact_schedule, load_motion
 from aerial_planner.srbm import SingleRigidBody
 from aerial_planner.symbolic import base_frame_model
 from aerial_planner.thesis_literal import LiteralProblem, LiteralSolution
@@ -23,7 +22,7 @@ def literal(subject: Subject) -> list[Row]:
     """
     rows = []
     for motion in subject.motions:
-        request = usual_request(motion)
+        request = usual_request(motion, subject.robot)
         subject.planner.warm_up(request)
         measure(subject.planner, request)
         theirs, ours = [], []
@@ -55,7 +54,7 @@ def _solve(subject: Subject, motion: str) -> LiteralSolution:
     robot, settings = subject.robot, subject.planner.settings
     model = base_frame_model(robot)
     ik = InverseKinematics(robot, model)
-    schedule = contact_schedule(usual_request(motion), load_motion(motion), robot, settings.dt, settings.flight_knots)
+    schedule = usual_schedule(motion, robot, settings)
     reference = body_reference(schedule, robot.standing_configuration(), robot, model, ik, settings)
     guess, _ = SingleRigidBody(robot, model, ik, settings, SolverOptions()).solve(schedule, reference)
     return LiteralProblem(robot, model, settings, Variant.AAKD_STAR, schedule, reference).solve(guess)

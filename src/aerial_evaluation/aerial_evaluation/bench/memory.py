@@ -31,7 +31,7 @@ def memory(subject: Subject) -> list[Row]:
     planner = Planner(subject.robot, cache=subject.cache)
     for motion in subject.motions:
         subject.progress(f"memory: building {motion}")
-        for request in (usual_request(motion), *_turning(motion)):
+        for request in (usual_request(motion, subject.robot), *_turning(subject, motion)):
             planner.warm_up(request)
             measure(planner, request)
     rows = [{"requests": 0, "planned": 0, "memory_mb": _resident()}]
@@ -44,9 +44,9 @@ def memory(subject: Subject) -> list[Row]:
     return rows
 
 
-def _turning(motion: str) -> list[MotionRequest]:
+def _turning(subject: Subject, motion: str) -> list[MotionRequest]:
     """Return a motion to its other sides, whose contact schedules may differ."""
-    if "rotation" not in load_motion(motion).goal:
+    if "rotation" not in load_motion(motion, subject.robot).goal:
         return []
     return [MotionRequest(motion=motion, rotation=turns) for turns in _TURNS]
 
@@ -55,7 +55,7 @@ def _requests(subject: Subject) -> Iterator[MotionRequest]:
     random = np.random.default_rng(subject.seed)
     for _ in range(REQUESTS):
         motion = str(random.choice(subject.motions))
-        said = load_motion(motion)
+        said = load_motion(motion, subject.robot)
         yield MotionRequest(
             motion=f"no {motion}" if random.random() < _NONSENSE else motion,
             displacement=np.array([*random.uniform(-_DISTANCE, _DISTANCE, 2), 0.0]),

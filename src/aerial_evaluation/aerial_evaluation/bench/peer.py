@@ -20,13 +20,13 @@ import numpy as np
 
 from aerial_evaluation.bench.samples import Row, measure, percentiles, summary
 from aerial_evaluation.bench.scaling import KNOTS
-from aerial_evaluation.bench.subject import Subject, usual_request
+from aerial_evaluation.bench.subject import Subject, usual_request, usual_schedule
 from aerial_model.errors import AerialError
 from aerial_model.plan import Plan
 from aerial_model.robot import Robot
 from aerial_planner.compiled import default_cache
 from aerial_planner.planner import Planner
-from aerial_planner.schedule import contact_schedule, load_motion
+from aerial_planner.schedule import load_motion
 from aerial_planner.settings import PlannerSettings
 
 REQUIREMENTS = (
@@ -111,7 +111,7 @@ def crocoddyl(subject: Subject) -> list[Row]:
     rows = []
     environment = Environment()
     for motion in subject.motions:
-        if load_motion(motion).rotation is not None:
+        if load_motion(motion, subject.robot).rotation is not None:
             continue
         for settings in _settings(subject, motion):
             rows += _rows(subject, motion, settings, environment)
@@ -121,13 +121,13 @@ def crocoddyl(subject: Subject) -> list[Row]:
 def _settings(subject: Subject, motion: str) -> list[PlannerSettings]:
     """Return settings by which the take-off has the ``KNOTS``."""
     usual = subject.planner.settings
-    schedule = contact_schedule(usual_request(motion), load_motion(motion), subject.robot, usual.dt, usual.flight_knots)
+    schedule = usual_schedule(motion, subject.robot, usual)
     return [dataclasses.replace(usual, dt=schedule.take_off_time / n) for n in KNOTS]
 
 
 def _rows(subject: Subject, motion: str, settings: PlannerSettings, environment: Environment) -> list[Row]:
     """Return the row of a motion and step, none if there is no plan that says where and when the peer is to land."""
-    request = usual_request(motion)
+    request = usual_request(motion, subject.robot)
     planner = Planner(subject.robot, settings=settings, cache=subject.cache, actuator_tolerance=np.inf)
     planner.warm_up(request)
     result = measure(planner, request).result
@@ -174,7 +174,7 @@ def problem(plan: Plan, robot: Robot, settings: PlannerSettings, repeats: int) -
     }
     return {
         **{name: array.tolist() for name, array in arrays.items()},
-        "urdf": str(robot.urdf),
+        "urdf": robot.description.text,
         "contact_frames": [point.frame for point in robot.contact_points],
         "friction": robot.friction_coefficient,
         "margin": settings.margin,

@@ -29,7 +29,7 @@ def profiles(subject: Subject) -> list[Row]:
     rows = []
     for motion in subject.motions:
         subject.progress(f"profiles of {motion}")
-        requests = {variant: usual_request(motion, variant) for variant in COLOURS}
+        requests = {variant: usual_request(motion, subject.robot, variant) for variant in COLOURS}
         samples: dict[Variant, Sample] = {}
         for variant, request in requests.items():
             subject.planner.warm_up(request)

@@ -7,11 +7,10 @@ import dataclasses
 import numpy as np
 
 from aerial_evaluation.bench.samples import Row, measure, summary
-from aerial_evaluation.bench.subject import Subject, usual_request
+from aerial_evaluation.bench.subject import Subject, usual_request, usual_schedule
 from aerial_model.errors import AerialError
 from aerial_model.robot import Robot, known_robots
 from aerial_planner.planner import Planner
-from aerial_planner.schedule import contact_schedule, load_motion
 
 KNOTS = (20, 40, 80, 160)  # of the take-off
 
@@ -21,8 +20,8 @@ def knots(subject: Subject) -> list[Row]:
     rows = []
     settings = subject.planner.settings
     for motion in subject.motions:
-        request = usual_request(motion)
-        usual = contact_schedule(request, load_motion(motion), subject.robot, settings.dt, settings.flight_knots)
+        request = usual_request(motion, subject.robot)
+        usual = usual_schedule(motion, subject.robot, settings)
         for wanted in KNOTS:
             dt = usual.take_off_time / wanted
             finer = dataclasses.replace(settings, dt=dt)
@@ -50,7 +49,7 @@ def robots(subject: Subject) -> list[Row]:
 
 
 def _repeated(subject: Subject, planner: Planner, motion: str) -> Row:
-    request = usual_request(motion)
+    request = usual_request(motion, subject.robot)
     planner.warm_up(request)
     measure(planner, request)
     return summary([measure(planner, request) for _ in range(subject.repeats)])

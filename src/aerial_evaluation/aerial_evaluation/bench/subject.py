@@ -14,10 +14,10 @@ from aerial_model.request import MotionRequest
 from aerial_model.robot import Robot
 from aerial_planner.kino_dynamic import Variant
 from aerial_planner.planner import Planner
-from aerial_planner.schedule import contact_schedule, known_motions, load_motion
+from aerial_planner.schedule import Schedule, contact_schedule, known_motions, load_motion
 from aerial_planner.settings import PlannerSettings
 
-FORWARD = 0.4  # where a motion goes that neither turns nor travels unless told to [m]
+FORWARD = 0.4  # where a motion goes that neither turns nor travels unless told to, for a robot of the reference size [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +35,7 @@ class Subject:
 
     def __post_init__(self) -> None:
         for motion in self.motions:
-            load_motion(motion)
+            load_motion(motion, self.robot)
         for name in ("repeats", "goals"):
             if getattr(self, name) < 1:
                 raise ConfigurationError(f"{name}: expected at least 1, found {getattr(self, name)}")
@@ -48,26 +48,33 @@ class Subject:
 
 def motions_of(robot: Robot) -> tuple[str, ...]:
     """Return the known motions that name no contact the robot does not have, those that turn least first."""
-    turns = {name: load_motion(name).rotation for name in known_motions() if _suits(name, robot)}
+    turns = {name: load_motion(name, robot).rotation for name in known_motions(robot) if _suits(name, robot)}
     return tuple(sorted(turns, key=lambda name: (0.0 if turns[name] is None else turns[name].turns, name)))
 
 
 def _suits(motion: str, robot: Robot) -> bool:
-    settings = robot.section("planner", PlannerSettings)
     try:
-        contact_schedule(usual_request(motion), load_motion(motion), robot, settings.dt, settings.flight_knots)
+        usual_schedule(motion, robot, robot.section("planner", PlannerSettings))
     except ConfigurationError:
         return False
     return True
 
 
-def usual_request(motion: str, variant: Variant = Variant.AAKD_STAR, *, warm_start: bool = True) -> MotionRequest:
+def usual_schedule(motion: str, robot: Robot, settings: PlannerSettings) -> Schedule:
+    """Return the contact schedule of a motion's usual request."""
+    said = load_motion(motion, robot)
+    return contact_schedule(usual_request(motion, robot), said, robot, settings.dt, settings.flight_knots)
+
+
+def usual_request(
+    motion: str, robot: Robot, variant: Variant = Variant.AAKD_STAR, *, warm_start: bool = True
+) -> MotionRequest:
     """Return the motion as its file says; one that would stay where it is goes ``FORWARD``."""
-    said = load_motion(motion)
+    said = load_motion(motion, robot)
     stays = said.rotation is None and not np.any(said.displacement)
     return MotionRequest(
         motion=motion,
-        displacement=np.array([FORWARD if stays else 0.0, 0.0, 0.0]),
+        displacement=np.array([FORWARD * robot.scale.length if stays else 0.0, 0.0, 0.0]),
         variant=variant.value,
         warm_start=warm_start,
     )

@@ -101,7 +101,7 @@ def record(subject: Subject, motion: str) -> Recording:
     """
     loop = Loop(Simulation(subject.robot, seed=subject.seed), RecordingController(subject.robot))
     loop.advance(STAND_TIME)
-    plan = subject.planner.plan(usual_request(motion), loop.controller.estimate).plan
+    plan = subject.planner.plan(usual_request(motion, subject.robot), loop.controller.estimate).plan
     loop.controller.accept(plan)
     begin = len(loop.controller.measurements)
     loop.advance(plan.landing_time + OBSERVE_TIME)

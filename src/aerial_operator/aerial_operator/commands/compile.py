@@ -26,7 +26,7 @@ def run(args: argparse.Namespace) -> Report:
     """Compile what is not compiled yet, for all motions, both senses of turning."""
     robot = Robot.load(args.robot)
     began = time.perf_counter()
-    compiled = compile_functions(robot, known_motions(), args.variant or ["AAKD*"])
+    compiled = compile_functions(robot, known_motions(robot), args.variant or ["AAKD*"])
     seconds, folder = time.perf_counter() - began, str(default_cache())
     figures = {"robot": robot.name, "compiled": compiled, "seconds": seconds, "folder": folder}
     return Report(

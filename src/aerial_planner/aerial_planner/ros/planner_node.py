@@ -99,7 +99,7 @@ class PlannerNode(node.AerialNode):
         """Take selections from now on; build the problems of motions meanwhile."""
         self._active = True
         asked = self.get_parameter("warm_up").value
-        self._prepare(list(known_motions()) if asked == "all" else [name for name in asked.split(",") if name])
+        self._prepare(list(known_motions(self._robot)) if asked == "all" else [name for name in asked.split(",") if name])
 
     def deactivate(self) -> None:
         """Take no more selections."""
@@ -141,7 +141,7 @@ class PlannerNode(node.AerialNode):
         if motions:
             self._worker.prepare(f"warming up for {', '.join(motions)}", partial(self._warm_up, *motions))
         else:
-            self.get_logger().info(f"ready to plan for {self._robot.name}: {', '.join(known_motions())}")
+            self.get_logger().info(f"ready to plan for {self._robot.name}: {', '.join(known_motions(self._robot))}")
 
     def _warm_up(self, motion: str, *others: str) -> None:
         try:

@@ -81,7 +81,7 @@ class SimNode(AerialNode):
 
     def activate(self) -> None:
         """Publish the first state; in real time, let the clock run."""
-        self._description.publish(String(data=self._robot.urdf.read_text(encoding="utf-8")))
+        self._description.publish(String(data=self._robot.description.text))
         self._active = True
         self._publish_state(state_to_message(self._session.measurement))
         if self._real_time:
