@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import pinocchio as pin
@@ -17,8 +17,9 @@ class ContactPoint:
     """A point of the robot that may carry load: the centre of a small sphere fixed to a URDF frame."""
 
     name: str
-    frame: str  # URDF link whose origin is the centre of the sphere
+    frame: str  # URDF link that carries the sphere
     radius: float  # of the sphere [m]; the centre stands this high above the ground
+    offset: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) of the centre, in the link's frame [m]
 
 
 def friction_pyramid(friction_coefficient: float) -> np.ndarray:

@@ -243,17 +243,21 @@ def _load(folder: Path) -> Robot:
     check_keys(
         data,
         required=["name", "contact_points", "bus_voltage", "actuators", "poses"],
-        optional=["urdf", "total_mass", "planning_range", "friction_coefficient", "frozen_joints", *_SECTIONS],
+        optional=[
+            *("urdf", "fixed_joints", "total_mass", "planning_range", "friction_coefficient", "frozen_joints"),
+            *_SECTIONS,
+        ],
         where=where,
     )
     total_mass = None if "total_mass" not in data else _positive(data["total_mass"], f"{where}: total_mass")
-    description = Description.read(data.get("urdf"), folders, total_mass, where)
+    fixed = data.get("fixed_joints", [])
+    description = Description.read(data.get("urdf"), folders, where=where, total_mass=total_mass, fixed_joints=fixed)
     model = _pinocchio_model(description)
     joints = tuple(str(name) for name in model.names[2:])
     actuators = _actuator_law(data["actuators"], joints, data["bus_voltage"], where)
     model.armature = np.concatenate([np.zeros(6), actuators.armature])
     points = _contact_points(data["contact_points"], model, where)
-    frames = tuple(model.getFrameId(point.frame) for point in points)
+    frames = tuple(_contact_frame(model, point) for point in points)
     poses = _poses(data, joints, where)
     friction = data.get("friction_coefficient", USUAL_FRICTION)
     return Robot(
@@ -326,11 +330,25 @@ def _contact_points(entries: Any, model: pin.Model, where: str) -> tuple[Contact
                 f"{where}: contact_points: {point.name}: the URDF has no link '{point.frame}'"
                 f"{closest(point.frame, [frame.name for frame in model.frames])}"
             )
+        if np.shape(point.offset) != (3,):
+            raise ConfigurationError(f"{where}: contact_points: {point.name}: offset: expected three numbers")
         if point.radius <= 0:
             raise ConfigurationError(f"{where}: contact_points: {point.name}: radius must be positive")
     if len({point.name for point in points}) != len(points):
         raise ConfigurationError(f"{where}: contact_points: names must differ")
     return points
+
+
+def _contact_frame(model: pin.Model, point: ContactPoint) -> int:
+    """Return the Pinocchio frame at the centre of a contact point, added to the model if no link lies there."""
+    link = model.getFrameId(point.frame)
+    if not np.any(point.offset):
+        return link
+    parent = model.frames[link]
+    placement = parent.placement * pin.SE3(np.eye(3), np.array(point.offset))
+    return model.addFrame(
+        pin.Frame(f"contact {point.name}", parent.parentJoint, link, placement, pin.FrameType.OP_FRAME)
+    )
 
 
 def _per_joint(

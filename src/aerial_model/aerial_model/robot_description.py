@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from aerial_model.config import closest
 from aerial_model.errors import ConfigurationError
 
 URDF_NAME = "robot.urdf"
 _PACKAGE = "package://"
+_TURNS = 4 * math.pi  # stops of a joint that has none [rad]
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
@@ -23,14 +27,22 @@ class Description:
     text: str  # its content, with the root link as heavy as the total mass asks, and mesh files by absolute path
 
     @staticmethod
-    def read(named: object, folders: tuple[Path, ...], total_mass: float | None, where: str) -> Description:
+    def read(
+        named: object,
+        folders: tuple[Path, ...],
+        *,
+        where: str,
+        total_mass: float | None = None,
+        fixed_joints: Sequence[str] = (),
+    ) -> Description:
         """Return the description of a robot.
 
         Args:
             named: path, relative to the robot's folder, or ``package://name/path``; None: the folder's ``robot.urdf``.
             folders: the robot's own, then those it extends: the first that has the file gives it.
-            total_mass: that the root link's mass and inertia are scaled for [kg]; None: as the file says.
             where: for error messages.
+            total_mass: that the root link's mass and inertia are scaled for [kg]; None: as the file says.
+            fixed_joints: joints that are held at zero, as if they were none: hands, heads.
 
         Raises:
             ConfigurationError: if there is no such file or no such root link, or it is no XML.
@@ -44,6 +56,8 @@ class Description:
             raise ConfigurationError(f"{path}: not a URDF: expected a <robot> with links, found <{tree.tag}>")
         if total_mass is not None:
             _set_total_mass(tree, total_mass, where)
+        _fix_joints(tree, fixed_joints, where)
+        _limit_continuous_joints(tree)
         for mesh in tree.iter("mesh"):
             mesh.set("filename", str(resolved(mesh.get("filename", ""), path.parent)))
         return Description(path=path, text=ElementTree.tostring(tree, encoding="unicode"))
@@ -80,6 +94,29 @@ def _found(name: str, folders: tuple[Path, ...], where: str) -> Path:
         if path.is_file():
             return path
     raise ConfigurationError(f"{where}: urdf: there is no file {candidates[0]}")
+
+
+def _fix_joints(tree: ElementTree.Element, names: Sequence[str], where: str) -> None:
+    joints = {joint.get("name"): joint for joint in tree.iter("joint")}
+    for name in names:
+        if name not in joints:
+            raise ConfigurationError(
+                f"{where}: fixed_joints: the URDF has no joint '{name}'{closest(str(name), joints)}"
+            )
+        joints[name].set("type", "fixed")
+
+
+def _limit_continuous_joints(tree: ElementTree.Element) -> None:
+    """Give joints that turn without end stops two turns away, so that one number is their position."""
+    for joint in tree.iter("joint"):
+        if joint.get("type") == "continuous":
+            joint.set("type", "revolute")
+            limit = joint.find("limit")
+            limit = ElementTree.SubElement(joint, "limit") if limit is None else limit
+            limit.set("lower", repr(-_TURNS))
+            limit.set("upper", repr(_TURNS))
+            for name in ("effort", "velocity"):
+                limit.set(name, limit.get(name, "0"))
 
 
 def _set_total_mass(tree: ElementTree.Element, total_mass: float, where: str) -> None:

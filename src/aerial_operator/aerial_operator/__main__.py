@@ -25,6 +25,8 @@ COMMANDS = {
     "campaign": "many seeded trials of one motion in parallel: the share that lands, and which seeds do not",
     "compile": "compile the planner's functions once, so that plans take half the time",
     "bench": "measure how fast and how reliably motions are planned, or how the control loop keeps up",
+    "draft": "write a first robot.yaml for somebody's URDF, what was guessed marked as such",
+    "check": "check a robot folder or a URDF: what is missing, what is implausible, what to do about it",
     "up": "start planner, controller and simulator, and keep them running",
     "select": "ask running nodes for one motion, and wait for what comes of it",
 }

@@ -16,9 +16,12 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
+from pathlib import Path
 
+import coal
 import mujoco
 import numpy as np
+import pinocchio as pin
 
 from aerial_model.errors import ConfigurationError
 from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, JOINT_POSITION, Robot
@@ -31,6 +34,7 @@ IMPEDANCE_RATIO = 100.0  # friction over normal stiffness
 STEPS_PER_TIME_CONSTANT = 2.0  # the stiffest contact MuJoCo keeps stable
 SOLVER_TOLERANCE = 1e-10
 XYZW = [4, 5, 6, 3]  # the base quaternion in qpos, where MuJoCo has w first
+_MESHES = (".stl", ".obj", ".msh")  # that MuJoCo reads
 WORLD_BODY = 0  # MuJoCo's id of the body all terrain belongs to
 ROBOT_SHAPE_GROUP = 3  # MuJoCo draws groups 0 to 2 unless told otherwise
 ROBOT_LOOKS_GROUP = 2
@@ -68,6 +72,7 @@ def build(robot: Robot, terrain: Terrain, physics_dt: float) -> World:
     """
     try:
         spec = mujoco.MjSpec.from_string(_urdf_with_looks(robot))
+        _add_hulls(spec, robot)
         root = spec.worldbody.first_body()
         root.add_freejoint(name="root")
         _set_options(spec, physics_dt)
@@ -94,9 +99,39 @@ def build(robot: Robot, terrain: Terrain, physics_dt: float) -> World:
 def _urdf_with_looks(robot: Robot) -> str:
     """Return the URDF's text, told to keep its visual shapes and to weld fixed links onto their parents."""
     tree = ElementTree.fromstring(robot.description.text)
+    for link in tree.iter("link"):
+        for shape in [*link.findall("visual"), *link.findall("collision")]:
+            mesh = shape.find("geometry/mesh")
+            if mesh is not None and (shape.tag == "collision" or not _readable(mesh.get("filename"))):
+                link.remove(shape)  # collision meshes come back as hulls
     settings = {"discardvisual": "false", "fusestatic": "true", "meshdir": str(robot.folder), "strippath": "false"}
     ElementTree.SubElement(ElementTree.SubElement(tree, "mujoco"), "compiler", settings)
     return ElementTree.tostring(tree, encoding="unicode")
+
+
+def _readable(mesh: str) -> bool:
+    path = Path(mesh)
+    return path.suffix.lower() in _MESHES and path.is_file()
+
+
+def _add_hulls(spec: mujoco.MjSpec, robot: Robot) -> None:
+    """Add the convex hulls of collision meshes, whatever their format: coal reads more of them than MuJoCo does."""
+    geometry = pin.buildGeomFromUrdfString(robot.model, robot.description.text, pin.GeometryType.COLLISION)
+    for i, item in enumerate(geometry.geometryObjects):
+        if not isinstance(item.geometry, coal.BVHModelBase):
+            continue
+        body = spec.body(robot.model.frames[item.parentFrame].name)
+        placement = robot.model.frames[item.parentFrame].placement.inverse() * item.placement
+        x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
+        vertices = np.array([item.geometry.vertices(k) for k in range(item.geometry.num_vertices)])
+        spec.add_mesh(name=f"hull {i}", uservert=vertices.astype(np.float32).ravel())
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_MESH,
+            meshname=f"hull {i}",
+            pos=placement.translation,
+            quat=[w, x, y, z],
+            mass=0,
+        )
 
 
 def _set_options(spec: mujoco.MjSpec, physics_dt: float) -> None:
@@ -139,6 +174,7 @@ def _add_contact_points(spec: mujoco.MjSpec, robot: Robot) -> list[str]:
         spec.body(point.frame).add_geom(
             name=names[-1],
             type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            pos=point.offset,
             size=[point.radius, 0, 0],
             group=ROBOT_SHAPE_GROUP,
             mass=0,

@@ -162,12 +162,12 @@ def _held(course: _Course, time: float, state: Configuration) -> WholeBodyTarget
     # The base task adds its feedback to this acceleration; the sum is what the support can give.
     position = course.gains.position
     feedback = position.stiffness * (com - state.com) + position.damping * (velocity - state.com_velocity)
-    acceleration = supported(state, acceleration + feedback) - feedback
+    total = supported(state, acceleration + feedback)
     tilt, angular_velocity, angular_acceleration = settled(course.tilt, time - course.begin)
     body = BodyTarget(
         com,
         velocity,
-        acceleration,
+        total - feedback,
         np.array(product_of(exp_of(vector(tilt)), quaternion(course.level))),
         angular_velocity,
         angular_acceleration,
@@ -187,7 +187,7 @@ def _held(course: _Course, time: float, state: Configuration) -> WholeBodyTarget
         np.zeros(n),
         inertia @ omega,
         inertia @ turning,
-        shared_load(state, acceleration),
+        shared_load(state, total),
         np.ones(len(state.contact_positions), dtype=np.bool_),
     )
 

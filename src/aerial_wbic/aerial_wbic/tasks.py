@@ -166,8 +166,9 @@ def limb_task(state: Configuration, target: WholeBodyTarget, joints: Joints, fee
             a[row : row + rank] = -(across @ state.Jdot_v_contacts[i])
             # Level ground bears all points of a foot; one that bears little is not put back by it.
             rise = state.contact_positions[i, 2] - state.contact_positions[first, 2]
-            rate = (state.J_contacts[i] - state.J_contacts[first]) @ state.v
-            a[row : row + rank] -= across @ (feedback.damping * rate) + feedback.stiffness * rise * across[:, 2]
+            rate = across @ ((state.J_contacts[i] - state.J_contacts[first]) @ state.v)
+            xdot[row : row + rank] = -feedback.stiffness / feedback.damping * rise * across[:, 2]
+            a[row : row + rank] += feedback.damping * (xdot[row : row + rank] - rate)
         row += rank
     _lead(state, target, joints.swinging, feedback, Task(J[row:], a[row:], xdot[row:]))
     return Task(J, a, xdot)
