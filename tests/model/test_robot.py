@@ -53,7 +53,7 @@ def test_a_folder_loads_like_the_robot_it_was_copied_from(folder):
     assert Robot.load(folder).model_hash == Robot.load("mini_cheetah").model_hash
 
 
-@pytest.mark.parametrize("key", ["name", "contact_points", "bus_voltage", "actuators", "poses", "planning_range"])
+@pytest.mark.parametrize("key", ["name", "contact_points", "bus_voltage", "actuators", "poses"])
 def test_a_missing_key_is_named(folder, key):
     edit(folder, lambda data: data.pop(key))
     with pytest.raises(ConfigurationError, match=f"key '{key}' is missing"):
@@ -73,7 +73,7 @@ def test_a_missing_key_is_named(folder, key):
         (lambda d: d["contact_points"][0].update(radius=0), "radius must be positive"),
         (lambda d: d["contact_points"][1].update(name="fr"), "names must differ"),
         (lambda d: d.update(contact_points=[]), "expected a list of points"),
-        (lambda d: d["poses"].pop("tuck"), "poses: 'tuck' is missing"),
+        (lambda d: d["poses"].pop("home"), "poses: 'home' is missing"),
         (lambda d: d["poses"]["home"].pop("hip"), "no value for joint"),
         (lambda d: d["poses"]["home"].update(elbow=1.0), "unknown joint or kind 'elbow'"),
         (lambda d: d["poses"]["home"].update(hip=float("nan")), "expected finite numbers"),
@@ -96,14 +96,14 @@ def test_an_unknown_robot_is_answered_with_those_that_exist():
 
 def test_a_folder_without_urdf_is_refused(folder):
     (folder / "robot.urdf").unlink()
-    with pytest.raises(ConfigurationError, match=r"robot\.urdf is missing"):
+    with pytest.raises(ConfigurationError, match=r"urdf: there is no file .*robot\.urdf"):
         Robot.load(folder)
 
 
 @pytest.mark.parametrize("text", ["<robot", "", "not xml at all"])
 def test_a_broken_urdf_is_refused(folder, text):
     (folder / "robot.urdf").write_text(text)
-    with pytest.raises(ConfigurationError, match="not a URDF that Pinocchio can read"):
+    with pytest.raises(ConfigurationError, match="not a URDF"):
         Robot.load(folder)
 
 

@@ -32,6 +32,9 @@ def fly(robot, model, alpha, *, tuck="tuck", step=0.005, rate=0.0):
         angular_momentum=np.array(alpha),
         joint_position=robot.poses["home"],
         joint_velocity=np.full(12, rate),
+        arms=robot.arms,
+        arm_position=np.zeros((17, 0)),
+        settling_time=0.08,
         step=step,
     )
 

@@ -59,7 +59,7 @@ def test_foot_jacobians_agree_with_pinocchio(robot, model, joints):
 
 def test_angular_momentum_agrees_with_adam(robot, model, joints):
     q_j, omega, dq_j = joints
-    adam = KinDynComputations(str(robot.urdf), list(robot.joint_names))
+    adam = KinDynComputations(str(robot.description.path), list(robot.joint_names))
     adam.set_frame_velocity_representation(Representations.MIXED_REPRESENTATION)
     A = np.asarray(adam.centroidal_momentum_matrix_fun()(np.eye(4), q_j).full())
     alpha = (A @ np.concatenate([np.zeros(3), omega, dq_j]))[3:]

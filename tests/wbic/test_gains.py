@@ -6,9 +6,11 @@ import dataclasses
 
 import pytest
 
+from aerial_model.config import from_mapping
 from aerial_model.errors import ConfigurationError
+from aerial_model.scale import Scale
 from aerial_wbic.controller import Controller
-from aerial_wbic.gains import EstimatorNoise
+from aerial_wbic.gains import ControllerGains, EstimatorNoise
 
 
 @pytest.mark.parametrize(
@@ -43,10 +45,18 @@ def test_a_misspelt_gain_is_named(robot):
         Controller(robot.with_section("controller", joint_dampning=1.0))
 
 
-def test_a_missing_section_is_named(robot):
+def test_a_robot_that_says_nothing_has_the_reference_robots_gains(robot, gains):
     bare = dataclasses.replace(robot, sections={})
-    with pytest.raises(ConfigurationError, match="controller: key 'follow' is missing"):
-        Controller(bare)
+    assert bare.section("controller", ControllerGains) == gains
+
+
+def test_gains_grow_with_the_robot_as_their_units_do(gains):
+    larger = from_mapping(ControllerGains, ControllerGains.defaults(Scale(mass=8.0, length=4.0)), "test")
+    assert larger.hold.position.stiffness == gains.hold.position.stiffness / 4  # 1/s², times go with √4
+    assert larger.settling_rate == gains.settling_rate / 2
+    assert larger.landing_depth == 4 * gains.landing_depth
+    assert larger.joint_damping == pytest.approx(8 * 16 / 2 * gains.joint_damping)
+    assert larger.estimator == gains.estimator
 
 
 def test_a_choice_is_named_with_all_there_are(robot):

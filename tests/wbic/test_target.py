@@ -7,7 +7,7 @@ import pytest
 
 from aerial_model import rotation
 from aerial_model.robot import BASE_ANGULAR
-from aerial_wbic.target import Fold, Hold, from_plan, shared_load, support_centre
+from aerial_wbic.target import Fold, Hold, from_plan, shared_load, support_centre, supported
 
 GRAVITY = 9.81  # [m/s²]
 FORCE_TOLERANCE = 0.05  # [N], the regularization's part
@@ -48,9 +48,25 @@ def test_a_hold_begins_where_and_as_the_robot_moves(state_at, hold_of, seed):
     body = hold_of(state).at(2.0, state).body
     np.testing.assert_allclose(body.com, state.com, atol=1e-9)
     np.testing.assert_allclose(body.com_velocity, state.com_velocity, atol=1e-9)
-    np.testing.assert_allclose(body.com_acceleration, 0.0, atol=1e-9)
+    np.testing.assert_allclose(body.com_acceleration, supported(state, np.zeros(3)), atol=1e-9)
     np.testing.assert_allclose(rotation.matrix(body.orientation), state.R_WB, atol=1e-9)
     np.testing.assert_allclose(body.angular_velocity, state.R_WB @ state.v[BASE_ANGULAR], atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_supported_acceleration_is_one_that_the_contact_points_give_without_turning_the_body(state_at, seed):
+    state = state_at(seed, moving=False)
+    wanted = np.random.default_rng(seed).uniform(-8, 8, 3)
+    given = supported(state, wanted)
+    force = state.mass * (given + [0.0, 0.0, GRAVITY])
+    points = state.contact_positions
+    meets = state.com[:2] - force[:2] / force[2] * (state.com[2] - points[:, 2].mean())
+    ahead = rotation.matrix(rotation.about_z(rotation.heading(state.base_orientation)))[:2, :2]
+    along, extent = meets @ ahead, points[:, :2] @ ahead
+    middle, half = (extent.max(axis=0) + extent.min(axis=0)) / 2, np.ptp(extent, axis=0) / 2
+    assert np.all(np.abs(along - middle) <= 0.81 * half)
+    assert given[2] == wanted[2]
+    np.testing.assert_allclose(supported(state, given), given, atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -62,7 +62,7 @@ def after(robot, state, vdot):
 @pytest.mark.parametrize("seed", range(5))
 def test_loaded_points_do_not_accelerate(robot, limbs, gains, state_at, target_at, seed):
     state = state_at(seed)
-    task = limb_task(state, target_at(state, ALL), limbs.joints(ALL).swinging, gains.swing_joint)
+    task = limb_task(state, target_at(state, ALL), limbs.joints(ALL), gains.swing_joint)
     vdot, _ = prioritized(state.M_inv, (task,))
     later = after(robot, state, vdot)
     change = later.contact_velocities - state.contact_velocities

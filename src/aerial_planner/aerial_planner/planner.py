@@ -208,9 +208,8 @@ class Planner:
             if self._may_tighten(stage, solution, use, clock):
                 margin *= _TIGHTENING * ACTUATOR_TOLERANCE / use.worst
                 continue
-            miss = attitude_miss(plan, schedule)
-            if _WORTH_CORRECTING < np.linalg.norm(miss) < _CORRECTABLE and clock.iterations <= _ITERATIONS_OF_REQUEST:
-                correction = correction - miss
+            if self._may_correct(attitude_miss(plan, schedule), solution, clock):
+                correction = correction - attitude_miss(plan, schedule)
                 continue
             check(plan, schedule, solution, use, self.robot, self.actuator_tolerance)
             missing, reason = self._missing_height(plan)
@@ -229,6 +228,14 @@ class Planner:
         return (
             use.worst > ACTUATOR_TOLERANCE
             and stage.variant is not Variant.KD
+            and solution.max_violation <= VIOLATION_TOLERANCE
+            and clock.iterations <= _ITERATIONS_OF_REQUEST
+        )
+
+    def _may_correct(self, miss: np.ndarray, solution: Solution, clock: _Clock) -> bool:
+        """Return whether the finely integrated flight ends elsewhere than the optimizer's, and there is time."""
+        return (
+            _WORTH_CORRECTING < np.linalg.norm(miss) < _CORRECTABLE
             and solution.max_violation <= VIOLATION_TOLERANCE
             and clock.iterations <= _ITERATIONS_OF_REQUEST
         )

@@ -35,6 +35,7 @@ STEPS_PER_TIME_CONSTANT = 2.0  # the stiffest contact MuJoCo keeps stable
 SOLVER_TOLERANCE = 1e-10
 XYZW = [4, 5, 6, 3]  # the base quaternion in qpos, where MuJoCo has w first
 _MESHES = (".stl", ".obj", ".msh")  # that MuJoCo reads
+LEAST_INERTIA = 1e-9  # [kg·m²]
 WORLD_BODY = 0  # MuJoCo's id of the body all terrain belongs to
 ROBOT_SHAPE_GROUP = 3  # MuJoCo draws groups 0 to 2 unless told otherwise
 ROBOT_LOOKS_GROUP = 2
@@ -104,9 +105,21 @@ def _urdf_with_looks(robot: Robot) -> str:
             mesh = shape.find("geometry/mesh")
             if mesh is not None and (shape.tag == "collision" or not _readable(mesh.get("filename"))):
                 link.remove(shape)  # collision meshes come back as hulls
-    settings = {"discardvisual": "false", "fusestatic": "true", "meshdir": str(robot.folder), "strippath": "false"}
+        _make_positive(link.find("inertial/inertia"))
+    settings = {"discardvisual": "false", "fusestatic": "true", "meshdir": str(robot.folder), "strippath": "false", "balanceinertia": "true"}
     ElementTree.SubElement(ElementTree.SubElement(tree, "mujoco"), "compiler", settings)
     return ElementTree.tostring(tree, encoding="unicode")
+
+
+def _make_positive(inertia: ElementTree.Element | None) -> None:
+    """Give a link that is as good as without inertia a tiny one: MuJoCo takes no other."""
+    if inertia is None:
+        return
+    xx, xy, xz, yy, yz, zz = (float(inertia.get(name, "0")) for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
+    if np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])[0] > 0:
+        return
+    for name, value in zip(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), (xx, 0, 0, yy, 0, zz), strict=True):
+        inertia.set(name, repr(max(value, LEAST_INERTIA) if name[1] == name[2] else 0.0))
 
 
 def _readable(mesh: str) -> bool:

@@ -11,6 +11,7 @@ from aerial_evaluation.bench.subject import motions_of, usual_request
 from aerial_model.errors import RefusalError
 from aerial_model.request import MotionRequest
 from aerial_model.robot import Robot
+from aerial_planner.schedule import known_motions, motions_folder
 
 REACH = np.array([[-0.5, -1.0], [1.5, 1.0]])  # backward and forward ends along two axes
 
@@ -90,9 +91,13 @@ def test_motions_come_from_their_files_those_that_turn_least_first(robot):
     assert motions.index("jump") < motions.index("spin") < motions.index("barrel_roll")
 
 
-def test_motions_of_contacts_that_a_robot_does_not_have_are_none_of_its(robot):
-    points = tuple(dataclasses.replace(point, name=f"{point.name}_toe") for point in robot.contact_points)
-    assert motions_of(dataclasses.replace(robot, contact_points=points)) == ("jump", "spin")
+def test_motions_of_contacts_that_a_robot_does_not_have_are_none_of_its(robot, tmp_path):
+    folder = tmp_path / "robot"
+    (folder / "motions").mkdir(parents=True)
+    own = (motions_folder() / "jump.yaml").read_text().replace("contacts: all", "contacts: [toe]")
+    (folder / "motions" / "tiptoe.yaml").write_text(own)
+    assert "tiptoe" in known_motions(dataclasses.replace(robot, folders=(folder,)))
+    assert "tiptoe" not in motions_of(dataclasses.replace(robot, folders=(folder,)))
 
 
 def test_a_motion_that_would_stay_goes_forward(robot):

@@ -89,7 +89,7 @@ def test_the_problem_is_the_plans(plan, planner, robot):
 
 def test_the_peer_finds_the_same_robot_in_the_problem(plan, planner, robot):
     asked = problem(plan, robot, planner.settings, repeats=1)
-    model = pin.buildModelFromUrdf(asked["urdf"], pin.JointModelFreeFlyer())
+    model = pin.buildModelFromXML(asked["urdf"], pin.JointModelFreeFlyer())
     assert pin.computeTotalMass(model) == pytest.approx(robot.mass)
     assert all(model.existFrame(name) for name in asked["contact_frames"])
     low, high = np.array(asked["joint_min"]), np.array(asked["joint_max"])
