@@ -18,6 +18,7 @@ import pinocchio as pin
 
 from aerial_model.errors import ConfigurationError
 from aerial_model.robot_description import Description
+from aerial_model.shapes import spanning_points
 
 RADIUS = 0.004  # of contact spheres: small, so that rolling moves a contact by millimetres [m]
 BUS_VOLTAGE = 48.0  # [V]
@@ -29,6 +30,8 @@ _DAMPING, _FRICTION = 6e-4, 0.01  # over the greatest torque [s/rad], [-]
 _USUAL_TORQUE = 2.0  # N·m per kg of robot and metre of leg, where the URDF has no limit
 _USUAL_SPEED = 25.0  # [rad/s], where the URDF has no limit
 _LOW = 0.15  # of the leg length: ends of limbs within this of the lowest stand on the ground
+_SAME = 0.005  # [m] that spheres of one sole may differ in height
+_FLATNESS = 1.0  # height of a foot over its length, at most
 _FLAT = 0.02  # [m] that the corners of a sole are apart at least
 _CROUCH = {True: 0.9, False: 0.7}  # leg length at home over that of the straight leg, of a biped and of others
 _FOLD = 0.6  # leg length tucked over that at home
@@ -154,9 +157,10 @@ class _Drafter:
         shapes = [s for s in self._shapes.geometryObjects if s.parentJoint == joint]
         spheres = [s for s in shapes if isinstance(s.geometry, coal.Sphere)]
         if spheres:
-            lowest = min(spheres, key=lambda s: self._world_placement(s)[2])
-            self._radii[joint] = float(lowest.geometry.radius)
-            return [self._offset_in(lowest.parentFrame, lowest.placement.translation)]
+            heights = [self._world_placement(s)[2] - s.geometry.radius for s in spheres]
+            low = [s for s, z in zip(spheres, heights, strict=True) if z < min(heights) + _SAME]
+            self._radii[joint] = float(low[0].geometry.radius)
+            return [self._offset_in(s.parentFrame, s.placement.translation) for s in low]
         corners = self._sole(shapes)
         if corners is not None:
             return corners
@@ -166,13 +170,15 @@ class _Drafter:
 
     def _sole(self, shapes: list[pin.GeometryObject]) -> list[tuple[int, np.ndarray]] | None:
         """Return the corners of the rectangle on which a link's shapes stand; None for no shapes, or hardly a sole."""
-        clouds = [(shape, _cloud(shape)) for shape in shapes]
+        clouds = [(shape, spanning_points(shape)) for shape in shapes]
         clouds = [(shape, cloud) for shape, cloud in clouds if len(cloud)]
         if not clouds:
             return None
         joint = shapes[0].parentJoint
         placement = self._data.oMi[joint]
         points = np.vstack([cloud @ placement.rotation.T + placement.translation for _, cloud in clouds])
+        if np.ptp(points[:, 2]) > _FLATNESS * np.ptp(points[:, :2], axis=0).max():
+            return None  # a shank, not a foot
         bottom = points[points[:, 2] < points[:, 2].min() + _FLAT]
         low, high = bottom.min(axis=0), bottom.max(axis=0)
         z = points[:, 2].min() + RADIUS
@@ -305,22 +311,6 @@ class _Drafter:
 
     def _index(self, joint: int) -> int:
         return self._model.joints[joint].idx_v - 6
-
-
-def _cloud(shape: pin.GeometryObject) -> np.ndarray:
-    """Return points ``(k, 3)`` that span a shape, in the frame of its joint."""
-    geometry = shape.geometry
-    if isinstance(geometry, coal.Box):
-        half = np.array(geometry.halfSide)
-        points = np.array(list(itertools.product(*zip(-half, half, strict=True))))
-    elif isinstance(geometry, (coal.Cylinder, coal.Capsule)):
-        r, h = geometry.radius, geometry.halfLength
-        points = np.array(list(itertools.product((-r, r), (-r, r), (-h, h))))
-    elif isinstance(geometry, coal.BVHModelBase):
-        points = np.array([geometry.vertices(k) for k in range(geometry.num_vertices)])
-    else:
-        return np.zeros((0, 3))
-    return points @ shape.placement.rotation.T + shape.placement.translation
 
 
 def _actuator(kind: str, joints: list[str], torque: float, speed: float, damping: float, friction: float) -> list[str]:

@@ -1,7 +1,7 @@
 """Does any link touch the terrain or another link on the way? Checked after the optimization, as in the thesis.
 
-The shapes are the URDF's collision geometry, by coal through Pinocchio. Contact points are left out: they are meant to
-touch, and their clearance is a number of its own (see ``checks``).
+The shapes are the URDF's collision geometry, by coal through Pinocchio. Contact points and the shapes they stand for are
+left out: they are meant to touch, and their clearance is a number of its own (see ``checks``).
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import pinocchio as pin
 from aerial_model import rotation
 from aerial_model.plan import Plan
 from aerial_model.robot import Robot
+from aerial_model.shapes import standing_shapes
 from aerial_model.terrain import Terrain
 
 TERRAIN_MARGIN = 0.001  # that links keep from the terrain [m]; a deep crouch brings shanks within millimetres
@@ -46,6 +47,8 @@ class CollisionModel:
         self.robot = robot
         self._geometry = pin.buildGeomFromUrdfString(robot.model, robot.description.text, pin.GeometryType.COLLISION)
         self._self_pairs = self._pairs()
+        standing = standing_shapes(robot.model, self._geometry, robot.standing_configuration())
+        self._above_ground = [k for k, item in enumerate(self._geometry.geometryObjects) if item.name not in standing]
 
     def first_touch(self, plan: Plan) -> Touch | None:
         """Return the first touch along a plan, None if nothing touches."""
@@ -89,7 +92,6 @@ class CollisionModel:
     def _with(self, terrain: Terrain) -> pin.GeometryModel:
         """Return the robot's geometry and the terrain's, with all pairs that count."""
         geometry = self._geometry.copy()
-        links = range(geometry.ngeoms)
         floor = np.array([0.0, 0.0, terrain.floor - _FLOOR[2] / 2])
         boxes = [(floor, _FLOOR, 0.0), *((box.centre, box.size, box.yaw) for box in terrain.boxes)]
         for pair in self._self_pairs:
@@ -97,6 +99,6 @@ class CollisionModel:
         for centre, size, yaw in boxes:
             placement = pin.SE3(rotation.matrix(rotation.about_z(yaw)), np.array(centre))
             index = geometry.addGeometryObject(pin.GeometryObject(_GROUND, 0, placement, coal.Box(*size)))
-            for link in links:
+            for link in self._above_ground:
                 geometry.addCollisionPair(pin.CollisionPair(link, index))
         return geometry

@@ -26,6 +26,7 @@ import pinocchio as pin
 from aerial_model.errors import ConfigurationError
 from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, JOINT_POSITION, Robot
 from aerial_model.rotation import about_z
+from aerial_model.shapes import standing_shapes
 from aerial_model.terrain import Terrain
 
 FRICTION_COEFFICIENT = 0.7  # of the world; planner and controller count on less, see robot.yaml
@@ -100,7 +101,11 @@ def build(robot: Robot, terrain: Terrain, physics_dt: float) -> World:
 def _urdf_with_looks(robot: Robot) -> str:
     """Return the URDF's text, told to keep its visual shapes and to weld fixed links onto their parents."""
     tree = ElementTree.fromstring(robot.description.text)
+    standing = standing_shapes(robot.model, _shapes(robot), robot.standing_configuration())
     for link in tree.iter("link"):
+        for i, shape in enumerate(link.findall("collision")):
+            if f"{link.get('name')}_{i}" in standing:
+                link.remove(shape)  # the contact points stand for it
         for shape in [*link.findall("visual"), *link.findall("collision")]:
             mesh = shape.find("geometry/mesh")
             if mesh is not None and (shape.tag == "collision" or not _readable(mesh.get("filename"))):
@@ -127,11 +132,16 @@ def _readable(mesh: str) -> bool:
     return path.suffix.lower() in _MESHES and path.is_file()
 
 
+def _shapes(robot: Robot) -> pin.GeometryModel:
+    return pin.buildGeomFromUrdfString(robot.model, robot.description.text, pin.GeometryType.COLLISION)
+
+
 def _add_hulls(spec: mujoco.MjSpec, robot: Robot) -> None:
     """Add the convex hulls of collision meshes, whatever their format: coal reads more of them than MuJoCo does."""
-    geometry = pin.buildGeomFromUrdfString(robot.model, robot.description.text, pin.GeometryType.COLLISION)
+    geometry = _shapes(robot)
+    standing = standing_shapes(robot.model, geometry, robot.standing_configuration())
     for i, item in enumerate(geometry.geometryObjects):
-        if not isinstance(item.geometry, coal.BVHModelBase):
+        if item.name in standing or not isinstance(item.geometry, coal.BVHModelBase):
             continue
         body = spec.body(robot.model.frames[item.parentFrame].name)
         placement = robot.model.frames[item.parentFrame].placement.inverse() * item.placement
