@@ -18,7 +18,7 @@ import pinocchio as pin
 
 from aerial_model.errors import ConfigurationError
 from aerial_model.robot_description import Description
-from aerial_model.shapes import spanning_points
+from aerial_model.shapes import lowest, spanning_points
 
 RADIUS = 0.004  # of contact spheres: small, so that rolling moves a contact by millimetres [m]
 BUS_VOLTAGE = 48.0  # [V]
@@ -31,6 +31,7 @@ _USUAL_TORQUE = 2.0  # N·m per kg of robot and metre of leg, where the URDF has
 _USUAL_SPEED = 25.0  # [rad/s], where the URDF has no limit
 _LOW = 0.15  # of the leg length: ends of limbs within this of the lowest stand on the ground
 _SAME = 0.005  # [m] that spheres of one sole may differ in height
+_ROUND = 1.5  # greatest over least extent of a ball
 _FLATNESS = 1.0  # height of a foot over its length, at most
 _FLAT = 0.02  # [m] that the corners of a sole are apart at least
 _CROUCH = {True: 0.9, False: 0.7}  # leg length at home over that of the straight leg, of a biped and of others
@@ -107,7 +108,7 @@ class _Drafter:
         if self._fixed:
             lines.append(f"fixed_joints: [{', '.join(self._fixed)}]")
         lines += ["", "contact_points: # GUESS: the lowest ends of the limbs"]
-        for point, frame, offset, radius in self._points():
+        for point, frame, offset, radius in self._points(home):
             at = "" if not np.any(offset) else f", offset: [{', '.join(f'{x:.4g}' for x in offset)}]"
             lines.append(f"  - {{name: {point}, frame: {frame}, radius: {radius:.4g}{at}}}")
         lines += ["", f"bus_voltage: {BUS_VOLTAGE} # [V] GUESS", "actuators: # GUESS: constants that give the URDF's limits"]
@@ -161,22 +162,25 @@ class _Drafter:
             low = [s for s, z in zip(spheres, heights, strict=True) if z < min(heights) + _SAME]
             self._radii[joint] = float(low[0].geometry.radius)
             return [self._offset_in(s.parentFrame, s.placement.translation) for s in low]
-        corners = self._sole(shapes)
-        if corners is not None:
-            return corners
+        low = min(shapes, key=lambda s: lowest(s, self._data.oMi[joint]), default=None)
+        cloud = np.zeros((0, 3)) if low is None else spanning_points(low)
+        if len(cloud):
+            extent = np.ptp(cloud, axis=0)
+            if extent.max() < _ROUND * extent.min():  # a ball, drawn as a mesh
+                self._radii[joint] = float(extent.max() / 2)
+                return [self._offset_in(low.parentFrame, (cloud.max(axis=0) + cloud.min(axis=0)) / 2)]
+            corners = self._sole(low, cloud)
+            if corners is not None:
+                return corners
         frames = [i for i, f in enumerate(model.frames) if f.parentJoint == joint and f.type == pin.FrameType.BODY]
         tip = min(frames, key=lambda i: self._data.oMf[i].translation[2])
         return [(tip, np.zeros(3))]
 
-    def _sole(self, shapes: list[pin.GeometryObject]) -> list[tuple[int, np.ndarray]] | None:
-        """Return the corners of the rectangle on which a link's shapes stand; None for no shapes, or hardly a sole."""
-        clouds = [(shape, spanning_points(shape)) for shape in shapes]
-        clouds = [(shape, cloud) for shape, cloud in clouds if len(cloud)]
-        if not clouds:
-            return None
-        joint = shapes[0].parentJoint
+    def _sole(self, shape: pin.GeometryObject, cloud: np.ndarray) -> list[tuple[int, np.ndarray]] | None:
+        """Return the corners of the rectangle on which a shape stands; None for what is hardly a sole."""
+        joint = shape.parentJoint
         placement = self._data.oMi[joint]
-        points = np.vstack([cloud @ placement.rotation.T + placement.translation for _, cloud in clouds])
+        points = cloud @ placement.rotation.T + placement.translation
         if np.ptp(points[:, 2]) > _FLATNESS * np.ptp(points[:, :2], axis=0).max():
             return None  # a shank, not a foot
         bottom = points[points[:, 2] < points[:, 2].min() + _FLAT]
@@ -191,7 +195,7 @@ class _Drafter:
             x += inset * np.sign((xs[0] + xs[-1]) / 2 - x)
             y += inset * np.sign((ys[0] + ys[-1]) / 2 - y)
             local = placement.rotation.T @ (np.array([x, y, z]) - placement.translation)
-            corners.append(self._offset_in(clouds[0][0].parentFrame, local))
+            corners.append(self._offset_in(shape.parentFrame, local))
         return corners
 
     def _offset_in(self, frame: int, in_joint: np.ndarray) -> tuple[int, np.ndarray]:
@@ -205,15 +209,21 @@ class _Drafter:
     def _world_placement(self, shape: pin.GeometryObject) -> np.ndarray:
         return self._data.oMi[shape.parentJoint].act(shape.placement).translation
 
-    def _points(self) -> list[tuple[str, str, np.ndarray, float]]:
-        """Return name, URDF link, offset and radius of the contact points."""
+    def _points(self, home: np.ndarray) -> list[tuple[str, str, np.ndarray, float]]:
+        """Return name, URDF link, offset and radius of the contact points; of a ball, its lowest point at home."""
+        model, data = self._model, self._data
+        q = pin.neutral(model)
+        q[7:] = home
+        pin.framesForwardKinematics(model, data, q)
         result = []
         for limb in self._limbs:
             many = len(limb.points) > 1
             for k, (frame, offset) in enumerate(limb.points):
                 name = re.sub(r"_?(link|foot|sole)$", "", frame) or frame
+                R = data.oMf[model.getFrameId(frame)].rotation
+                offset = offset - R.T @ [0.0, 0.0, limb.radius - min(RADIUS, limb.radius)]
                 offset = np.where(np.abs(offset) < 1e-6, 0.0, offset)
-                result.append((f"{name}_{k + 1}" if many else name, frame, offset, limb.radius))
+                result.append((f"{name}_{k + 1}" if many else name, frame, offset, min(RADIUS, limb.radius)))
         return result
 
     # --- poses ---------------------------------------------------------------------------------------------------------
