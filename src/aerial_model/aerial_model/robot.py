@@ -38,6 +38,7 @@ BASE_ANGULAR = slice(3, 6)  # in v
 JOINT_VELOCITY = slice(6, None)  # in v
 
 YAML_NAME = "robot.yaml"
+GRAVITY = 9.81  # [m/s²]
 OFF_STOPS = 0.05  # that plans keep from joint stops [rad, m]: a leg that meets one lifts its foot
 USUAL_FRICTION = 0.495  # 0.7/√2: the pyramid (3.9) then lies inside the cone of the world's 0.7
 _SECTIONS = ("planner", "controller", "sensors")  # each read, as a dataclass of its own, by the package it is for
@@ -111,6 +112,18 @@ class Robot:
         q = self.standing_configuration()
         height = pin.centerOfMass(self.model, self.model.createData(), q)[2]
         return Scale(mass=round(self.mass / REFERENCE_MASS, 3), length=round(float(height) / REFERENCE_HEIGHT, 3))
+
+    @cached_property
+    def strength(self) -> float:
+        """Greatest force on all contact points, straight up at home, in weights: what the weakest joint can push."""
+        q = self.standing_configuration()
+        data = self.model.createData()
+        pin.computeJointJacobians(self.model, data, q)
+        pin.updateFramePlacements(self.model, data)
+        share = self.mass * GRAVITY / self.n_contacts
+        axes = pin.LOCAL_WORLD_ALIGNED
+        torque = sum(share * pin.getFrameJacobian(self.model, data, f, axes)[2] for f in self.contact_frames)
+        return float(np.min(self.actuators.torque_max / np.maximum(np.abs(torque[JOINT_VELOCITY]), 1e-9)))
 
     def section(self, name: str, cls: type[T]) -> T:
         """Return a section of ``robot.yaml`` as the dataclass that reads it.

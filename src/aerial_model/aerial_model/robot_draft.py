@@ -27,7 +27,8 @@ _RESISTIVE = 0.3  # share of the voltage that full torque takes: it is there up 
 _CONSTANTS = 0.75  # torque constant over back-EMF constant
 _ARMATURE = 6e-6  # reflected rotor inertia over the square of the greatest torque [kg·m²/(N·m)²]
 _DAMPING, _FRICTION = 6e-4, 0.01  # over the greatest torque [s/rad], [-]
-_USUAL_TORQUE = 2.0  # N·m per kg of robot and metre of leg, where the URDF has no limit
+_USUAL_TORQUE = 4.0  # N·m per kg of robot and metre of leg, where the URDF has no limit
+_IMPLAUSIBLE = 20.0  # times the usual torque
 _USUAL_SPEED = 25.0  # [rad/s], where the URDF has no limit
 _LOW = 0.15  # of the leg length: ends of limbs within this of the lowest stand on the ground
 _SAME = 0.005  # [m] that spheres of one sole may differ in height
@@ -35,7 +36,7 @@ _ROUND = 1.5  # greatest over least extent of a ball
 _FLATNESS = 1.0  # height of a foot over its length, at most
 _FLAT = 0.02  # [m] that the corners of a sole are apart at least
 _CROUCH = {True: 0.9, False: 0.7}  # leg length at home over that of the straight leg, of a biped and of others
-_FOLD = 0.6  # leg length tucked over that at home
+_FOLD, _FOLD_BIPED = 0.6, 0.7  # leg length tucked over that at home
 _ASTRIDE = 0.1  # leg lengths by which the feet of a biped that lands stand wider than at home
 _RANGES = 0.05  # [rad] that poses keep from stops
 
@@ -96,7 +97,7 @@ class _Drafter:
         model = self._model
         names = [str(n) for n in model.names[2:]]
         home = self._standing(_CROUCH[self._is_biped])
-        tuck = self._standing(_CROUCH[self._is_biped] * (_FOLD if not self._is_biped else 0.8), home)
+        tuck = self._standing(_CROUCH[self._is_biped] * (_FOLD if not self._is_biped else _FOLD_BIPED), home)
         landing = self._standing(0.5 + 0.5 * _CROUCH[True], home, _ASTRIDE) if self._is_biped else home
         self._guesses.append("poses: legs bent under the body; look at them")
         kinds = self._kinds()
@@ -136,8 +137,8 @@ class _Drafter:
         candidates = {j: self._end_points(j) for j in ends}
         heights = {j: min(self._world(frame, offset)[2] for frame, offset in points) for j, points in candidates.items()}
         floor = min(heights.values())
-        size = -floor if floor < 0 else 1.0
-        chosen = [j for j in ends if heights[j] < floor + _LOW * size]
+        self._leg = -floor if floor < 0 else 1.0  # from the base down [m]
+        chosen = [j for j in ends if heights[j] < floor + _LOW * self._leg]
         if len(chosen) < 2 and len(ends) > 1:
             raise ConfigurationError(
                 f"{self._urdf}: fewer than two limbs reach the ground with all joints at zero: no legs to guess"
@@ -288,13 +289,13 @@ class _Drafter:
     def _kinds(self) -> dict[str, tuple[list[int], float, float, float, float]]:
         """Return kinds of actuators: joints with the same limits → joints, torque, speed, damping, friction."""
         model = self._model
-        leg = max(abs(self._data.oMi[limb.link].translation[2]) for limb in self._limbs)
-        usual = _USUAL_TORQUE * pin.computeTotalMass(model) * max(leg, 0.1)
+        usual = _USUAL_TORQUE * pin.computeTotalMass(model) * self._leg
         groups: dict[tuple[float, ...], list[int]] = {}
         for j in range(len(self._low)):
             torque, speed = model.effortLimit[6 + j], model.velocityLimit[6 + j]
-            if not 0 < torque < 1e4:
-                self._guesses.append(f"{model.names[2 + j]}: no torque limit in the URDF; {usual:.0f} N·m from mass and leg length")
+            if not 0 < torque < _IMPLAUSIBLE * usual:
+                text = f"{model.names[2 + j]}: {torque:g} N·m in the URDF is no motor's limit"
+                self._guesses.append(f"{text}; {usual:.1f} N·m from mass and leg length")
                 torque = usual
             if not 0 < speed < 1e3:
                 self._guesses.append(f"{model.names[2 + j]}: no speed limit in the URDF; {_USUAL_SPEED:.0f} rad/s")

@@ -8,7 +8,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-_NEAR = 0.005  # [m] of the ground at home: a shape this low is what the robot stands on
+_NEAR = 0.05  # of the centre of mass's height: a shape that reaches as low at home is what the robot stands on
 
 
 def spanning_points(shape: pin.GeometryObject) -> np.ndarray:
@@ -39,10 +39,10 @@ def lowest(shape: pin.GeometryObject, joint: pin.SE3) -> float:
 
 
 def standing_shapes(model: pin.Model, shapes: pin.GeometryModel, q: np.ndarray) -> set[str]:
-    """Return the names of the shapes that touch the ground, z = 0, when the robot stands at ``q`` ``(nq,)``.
+    """Return the names of the shapes that are as good as on the ground, z = 0, when the robot stands at ``q`` ``(nq,)``.
 
     The contact points stand for them: nothing else of the robot is meant to touch.
     """
     data = model.createData()
-    pin.forwardKinematics(model, data, q)
-    return {shape.name for shape in shapes.geometryObjects if lowest(shape, data.oMi[shape.parentJoint]) < _NEAR}
+    near = _NEAR * pin.centerOfMass(model, data, q)[2]
+    return {shape.name for shape in shapes.geometryObjects if lowest(shape, data.oMi[shape.parentJoint]) < near}

@@ -1,13 +1,13 @@
 """From a request to its contact schedule: which contact point carries load when, how long the flight is, where it ends.
 
 A motion is data: one YAML file in ``motions/``; no motion has code of its own. Those of this package hold for any robot:
-they name contact points by where they are, and their times and lengths, those of a Mini Cheetah, are scaled. A robot's
-folder may have ``motions/`` of its own, which come first and hold as they are.
+they name contact points by where they are; their times and lengths, those of a Mini Cheetah, are scaled, and a robot
+with weaker legs for its weight flies lower. A robot's folder may have ``motions/`` of its own, which come first and hold as they are.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
@@ -26,6 +26,8 @@ GRAVITY = 9.81  # [m/s²]
 _CLEARANCE_SPARED = 0.6  # share of the clearance the optimizer may do without where it binds
 _FLIGHT_TIME_STRETCH = 1.2  # longest flight over the nominal one
 _SIDES = {"front": (0, 1), "rear": (0, -1), "left": (1, 1), "right": (1, -1)}  # axis and sign, seen from the centre
+_REFERENCE_STRENGTH = 9.0  # of the Mini Cheetah, see ``Robot.strength``
+_LEAST_SPRING = 0.25  # share of the clearance that the weakest robot is asked for
 _UNITS = {
     "duration": Unit(time=1),
     "duration_range": Unit(time=1),
@@ -143,13 +145,17 @@ def load_motion(name: str, robot: Robot) -> Motion:
         raise RefusalError(
             RefusalCode.UNKNOWN_MOTION, f"unknown motion '{name}'{closest(name, known)}; known: {', '.join(known)}"
         )
-    scale = robot.scale if known[name].parent == motions_folder() else Scale()
-    return _read_motion(known[name], known[name].stat().st_mtime_ns, scale)
+    if known[name].parent != motions_folder():
+        return _read_motion(known[name], known[name].stat().st_mtime_ns, Scale(), 1.0)
+    # What is left of the legs' force when the weight is borne is what the robot rises by.
+    spring = float(np.clip((robot.strength - 1) / (_REFERENCE_STRENGTH - 1), _LEAST_SPRING, 1.0))
+    return _read_motion(known[name], known[name].stat().st_mtime_ns, robot.scale, spring)
 
 
 @lru_cache
-def _read_motion(file: Path, changed: int, scale: Scale) -> Motion:
-    return from_mapping(Motion, scale.applied(load_yaml(file), _UNITS), str(file))
+def _read_motion(file: Path, changed: int, scale: Scale, spring: float) -> Motion:
+    motion = from_mapping(Motion, scale.applied(load_yaml(file), _UNITS), str(file))
+    return replace(motion, flight=replace(motion.flight, clearance=spring * motion.flight.clearance))
 
 
 def flight_time(rise: float, height: float) -> float:

@@ -9,7 +9,8 @@ What is chosen here, and why:
   dry friction are equally stiff: MuJoCo's default lets a joint held by dry friction creep at 0.03 rad/s.
 * ``implicitfast`` treats joint damping implicitly; with a 0.5 ms step a flip with swinging legs keeps its
   angular momentum to 0.3 %, a test.
-* The robot's links collide with the world and with one another, except neighbours in the tree (MuJoCo's own rule).
+* The robot's links collide with the world and with one another, except neighbours in the tree (MuJoCo's own rule) and
+  those that meet in the home pose. Collision meshes are their convex hulls.
 """
 
 from __future__ import annotations
@@ -75,6 +76,7 @@ def build(robot: Robot, terrain: Terrain, physics_dt: float) -> World:
     try:
         spec = mujoco.MjSpec.from_string(_urdf_with_looks(robot))
         _add_hulls(spec, robot)
+        _let_pass(spec, robot)
         root = spec.worldbody.first_body()
         root.add_freejoint(name="root")
         _set_options(spec, physics_dt)
@@ -157,6 +159,23 @@ def _add_hulls(spec: mujoco.MjSpec, robot: Robot) -> None:
         )
 
 
+def _let_pass(spec: mujoco.MjSpec, robot: Robot) -> None:
+    """Let links pass through each other whose shapes meet at home already: they are drawn too large, or fold."""
+    geometry = _shapes(robot)
+    geometry.addAllCollisionPairs()
+    model, data, results = robot.model, robot.model.createData(), pin.GeometryData(geometry)
+    pin.computeCollisions(model, data, geometry, results, robot.standing_configuration(), False)
+    root = spec.worldbody.first_body()
+    bodies = {1: root.name} | {j: spec.joint(str(model.names[j])).parent.name for j in range(2, model.njoints)}
+    met = set()
+    for pair, result in zip(geometry.collisionPairs, results.collisionResults, strict=True):
+        a, b = (geometry.geometryObjects[k].parentJoint for k in (pair.first, pair.second))
+        if result.isCollision() and a != b:
+            met.add((bodies[min(a, b)], bodies[max(a, b)]))
+    for first, second in sorted(met):
+        spec.add_exclude(bodyname1=first, bodyname2=second)
+
+
 def _set_options(spec: mujoco.MjSpec, physics_dt: float) -> None:
     spec.option.timestep = physics_dt
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -186,6 +205,7 @@ def _stiffest(physics_dt: float) -> list[float]:
 
 def _set_shapes(spec: mujoco.MjSpec) -> None:
     for geom in spec.geoms:
+        geom.mass = 0.0  # a link's is what its <inertial> says; MuJoCo would give one to links without
         collides = geom.contype != 0
         geom.group = ROBOT_SHAPE_GROUP if collides else ROBOT_LOOKS_GROUP
 

@@ -31,11 +31,10 @@ _SETTINGS = {
     "warm_starting": True,
     "polishing": False,
 }
-# Penalties tried in this order, found on recorded motions and on random problems: the first takes 15 iterations in the
-# median and 20 to 30 at the 99th percentile, of a quadruped's jump, roll and flip as of a humanoid's jump, spin and flip;
-# the second solves what is far from what the ground can give.
-_USUAL = {"rho": 0.2, "max_iter": 150}
-_HARD = {"rho": 100.0, "max_iter": 2500}  # up to 1 ms
+# The penalty was found on recorded motions: it takes 15 iterations in the median and 20 to 30 at the 99th percentile, of a
+# quadruped's jump, roll and flip as of a humanoid's jump, spin and flip. What is far from what the ground can give takes
+# hundreds; an active-set method is faster there.
+_PENALTY = {"rho": 0.2, "max_iter": 150}
 _DAQP_SOLVED = 1
 _ACCEPTED = (osqp.SolverStatus.OSQP_SOLVED, osqp.SolverStatus.OSQP_SOLVED_INACCURATE)
 
@@ -53,7 +52,8 @@ QpFactory = Callable[[sparse.csc_matrix, np.ndarray, np.ndarray], QpMinimizer]  
 class Osqp:
     """OSQP, set up once for all problems of one sparsity; each starts from the solution of the last.
 
-    Its penalty does not adapt to what it met before, so that equal input gives equal output to the last bit.
+    Its penalty does not adapt to what it met before, so that equal input gives equal output to the last bit. What it has
+    not solved in time is left to DAQP.
     """
 
     def __init__(self, A: sparse.csc_matrix, lower: np.ndarray, upper: np.ndarray) -> None:
@@ -61,23 +61,21 @@ class Osqp:
         self._nothing = np.zeros(variables), np.zeros(rows)
         self._solver = osqp.OSQP()
         P = sparse.eye(variables, format="csc")
-        self._solver.setup(P, self._nothing[0], A, lower, upper, **_SETTINGS, **_USUAL)
+        self._solver.setup(P, self._nothing[0], A, lower, upper, **_SETTINGS, **_PENALTY)
+        self._second = Daqp(A, lower, upper)
+        reduced(A.data, A.indices, A.indptr, lower, upper)  # compiles what no tick may
         self._core = self._solver._solver  # OSQP itself: the wrapper's bookkeeping takes longer than the solution
 
     def minimum(self, A: sparse.csc_matrix, lower: np.ndarray, upper: np.ndarray) -> np.ndarray | None:
-        """Return √Q_2 δ_f; None if OSQP gives up also with the second penalty."""
+        """Return √Q_2 δ_f; None if DAQP, the second to try, finds none either."""
         self._core.update_data_vec(q=None, l=lower, u=upper)
         self._core.update_data_mat(P_x=None, P_i=None, A_x=A.data, A_i=None)
         x = self._attempt()
-        if x is None:
-            self._solver.update_settings(**_HARD)
-            x = self._attempt()
-            self._solver.update_settings(**_USUAL)
-        if x is None:
-            x, y = self._nothing
-            self._solver.warm_start(x=x, y=y)
-            return None
-        return x[N_BASE:]
+        if x is not None:
+            return x[N_BASE:]
+        x, y = self._nothing
+        self._solver.warm_start(x=x, y=y)
+        return self._second.minimum(A, lower, upper)
 
     def _attempt(self) -> np.ndarray | None:
         """Return the variables that OSQP finds; None if it gives up."""
