@@ -12,13 +12,13 @@ from aerial_model.terrain import Terrain
 from aerial_sim import world
 
 TOLERANCE = 1e-8  # SI units, relative to 1 or to the largest entry
-MASS = 8.912  # [kg] trunk, legs and twelve rotors
+MASS = {"mini_cheetah": 8.912, "mit_humanoid": 25.0}  # [kg]
 STATES = range(20)
 
 
-@pytest.fixture(scope="module")
-def robot():
-    return Robot.load("mini_cheetah")
+@pytest.fixture(scope="module", params=sorted(MASS))
+def robot(request):
+    return Robot.load(request.param)
 
 
 @pytest.fixture(scope="module")
@@ -76,8 +76,8 @@ def _velocity_map(built, q):
 
 
 def test_the_mass_is_that_of_the_source(robot, built):
-    assert robot.mass == pytest.approx(MASS, abs=TOLERANCE)
-    assert built.model.body_mass.sum() == pytest.approx(MASS, abs=TOLERANCE)
+    assert robot.mass == pytest.approx(MASS[robot.name], abs=TOLERANCE)
+    assert built.model.body_mass.sum() == pytest.approx(MASS[robot.name], abs=TOLERANCE)
 
 
 def test_the_centre_of_mass_agrees(robot, built, random_state):

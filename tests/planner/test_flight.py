@@ -5,6 +5,7 @@ import pinocchio as pin
 import pytest
 
 from aerial_model import rotation
+from aerial_model.robot import Robot
 from aerial_planner.flight import integrate_flight
 from aerial_planner.reference import FlightPath
 from aerial_planner.symbolic import base_frame_model
@@ -71,3 +72,28 @@ def test_the_flight_ends_in_the_landing_pose(robot, model):
     np.testing.assert_allclose(
         fly(robot, model, [0, 0, 0], rate=3.0).joint_position[-1], robot.poses["landing"], atol=1e-9
     )
+
+
+def test_arms_go_through_their_knots_from_the_rates_they_leave_the_ground_with():
+    robot = Robot.load("mit_humanoid")
+    arms, rates = robot.arms, np.zeros(robot.n_joints)
+    rates[arms] = 2.0
+    knots = robot.poses["home"][arms] + 0.5 * np.linspace(0.0, 1.0, 17)[:, None] ** 2
+    flight = integrate_flight(
+        base_frame_model(robot),
+        path(robot),
+        duration=T,
+        orientation=rotation.IDENTITY,
+        angular_momentum=np.zeros(3),
+        joint_position=robot.poses["home"],
+        joint_velocity=rates,
+        arms=arms,
+        arm_position=knots,
+        settling_time=0.08,
+    )
+    np.testing.assert_allclose(flight.joint_velocity[0, arms], 2.0)
+    np.testing.assert_allclose(flight.joint_position[0, arms], knots[0])
+    np.testing.assert_allclose(flight.joint_position[-1, arms], knots[-1], atol=0.05)
+    change = np.diff(flight.joint_position[:, arms], axis=0) / np.diff(flight.time)[:, None]
+    mean = (flight.joint_velocity[1:, arms] + flight.joint_velocity[:-1, arms]) / 2
+    np.testing.assert_allclose(change, mean, atol=0.2)

@@ -11,9 +11,10 @@ import pytest
 
 from aerial_model import rotation
 from aerial_model.kinematics import Kinematics
-from aerial_model.robot import JOINT_POSITION, JOINT_VELOCITY
-from aerial_wbic.gains import TaskOrder
+from aerial_model.robot import JOINT_POSITION, JOINT_VELOCITY, Robot
+from aerial_wbic.gains import ControllerGains, TaskOrder
 from aerial_wbic.hierarchy import Task, prioritized, weighted
+from aerial_wbic.target import BodyTarget, WholeBodyTarget
 from aerial_wbic.tasks import (
     Arrangement,
     Limbs,
@@ -210,3 +211,29 @@ def test_weighted_tasks_share_what_they_disagree_on():
 
 def test_all_arrangements_share_one_compiled_tick(gains):
     assert len({numba.typeof(arranged(gains, order)) for order in TaskOrder}) == 1
+
+
+@pytest.mark.parametrize("mask", [(1, 1, 1, 1), (1, 0, 1, 0), (1, 1, 0, 1)])
+def test_feet_with_several_points_are_held_without_saying_it_twice(mask):
+    robot = Robot.load("mit_humanoid")
+    gains = robot.section("controller", ControllerGains)
+    q = robot.standing_configuration()
+    state = Kinematics(robot).at(q, np.random.default_rng(0).normal(0, 0.3, robot.model.nv))
+    contact = np.array(mask, dtype=bool)
+    still = np.zeros(robot.n_joints)
+    body = BodyTarget(state.com, still[:3], still[:3], q[3:7], still[:3], still[:3], gains.hold)
+    target = WholeBodyTarget(
+        body, q[JOINT_POSITION], still, still, still[:3], still[:3], np.zeros((robot.n_contacts, 3)), contact
+    )
+    joints = Limbs(robot).joints(contact)
+    task = limb_task(state, target, joints, gains.swing_joint)
+    assert len(task.a) == len(robot.holding_rows(contact)) + len(joints.swinging)
+    assert np.linalg.matrix_rank(task.J) == len(task.a)
+
+
+def test_in_the_air_nothing_asks_for_another_angular_momentum(robot, gains, state_at, target_at):
+    state = state_at(3)
+    target = target_at(state, NONE)._replace(angular_momentum=state.angular_momentum + 1.0)
+    task = angular_momentum_task(state, target, gains.angular_momentum_damping)
+    vdot = np.linalg.lstsq(task.J, task.a, rcond=None)[0]
+    np.testing.assert_allclose(state.A_G[:3] @ vdot + state.Adot_v_G[:3], 0.0, atol=1e-9)

@@ -68,7 +68,9 @@ def _urdf(path: Path) -> Iterator[Finding]:
         yield Finding(level=ERROR, text=f"{path}: not readable as XML ({error})")
         return
     if tree.tag != "robot":
-        yield Finding(level=ERROR, text=f"{path}: expected <robot>, found <{tree.tag}>; xacro files have to be expanded first")
+        yield Finding(
+            level=ERROR, text=f"{path}: expected <robot>, found <{tree.tag}>; xacro files have to be expanded first"
+        )
         return
     yield from _tree(tree)
     moving = _moving_links(tree)
@@ -76,7 +78,9 @@ def _urdf(path: Path) -> Iterator[Finding]:
         yield from _inertia(link, moved=link.get("name") in moving)
     for joint in tree.iter("joint"):
         yield from _joint(joint)
-    missing = {m.get("filename", "") for m in tree.iter("mesh") if not resolved(m.get("filename", ""), path.parent).is_file()}
+    missing = {
+        m.get("filename", "") for m in tree.iter("mesh") if not resolved(m.get("filename", ""), path.parent).is_file()
+    }
     for mesh in sorted(missing):
         yield Finding(level=WARNING, text=f"mesh file {mesh} is not found: it is neither drawn nor collided with")
 
@@ -103,7 +107,11 @@ def _tree(tree: ElementTree.Element) -> Iterator[Finding]:
 
 def _moving_links(tree: ElementTree.Element) -> set[str]:
     """Return the links that a joint moves."""
-    return {j.find("child").get("link") for j in tree.iter("joint") if j.get("type") not in (None, "fixed") and j.find("child") is not None}
+    return {
+        j.find("child").get("link")
+        for j in tree.iter("joint")
+        if j.get("type") not in (None, "fixed") and j.find("child") is not None
+    }
 
 
 def _inertia(link: ElementTree.Element, *, moved: bool) -> Iterator[Finding]:
@@ -114,7 +122,9 @@ def _inertia(link: ElementTree.Element, *, moved: bool) -> Iterator[Finding]:
         return
     try:
         mass = float(inertial.find("mass").get("value"))
-        xx, xy, xz, yy, yz, zz = (float(inertial.find("inertia").get(k, "0")) for k in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
+        xx, xy, xz, yy, yz, zz = (
+            float(inertial.find("inertia").get(k, "0")) for k in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+        )
     except (TypeError, ValueError):
         yield Finding(level=ERROR, text=f"link '{name}': mass or inertia is no number")
         return
@@ -125,14 +135,20 @@ def _inertia(link: ElementTree.Element, *, moved: bool) -> Iterator[Finding]:
         return
     principal = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if principal[0] <= 0:
-        yield Finding(level=ERROR if moved else WARNING, text=f"link '{name}': its inertia is not positive definite (least {principal[0]:.2g} kg·m²)")
+        yield Finding(
+            level=ERROR if moved else WARNING,
+            text=f"link '{name}': its inertia is not positive definite (least {principal[0]:.2g} kg·m²)",
+        )
     elif principal[0] + principal[1] < principal[2] * (1 - 1e-6):
         text = f"link '{name}': no body has this inertia: {principal[0]:.3g} + {principal[1]:.3g} < {principal[2]:.3g} kg·m² (triangle inequality)"
         yield Finding(level=WARNING, text=text)
     else:
         size = np.sqrt(5 * principal.mean() / (2 * mass))  # radius of a ball with that inertia
         if mass / (4 / 3 * np.pi * size**3) > _DENSITY:
-            yield Finding(level=WARNING, text=f"link '{name}': {mass:.3g} kg with the inertia of a ball of {200 * size:.1f} cm is denser than gold")
+            yield Finding(
+                level=WARNING,
+                text=f"link '{name}': {mass:.3g} kg with the inertia of a ball of {200 * size:.1f} cm is denser than gold",
+            )
 
 
 def _joint(joint: ElementTree.Element) -> Iterator[Finding]:
@@ -140,10 +156,14 @@ def _joint(joint: ElementTree.Element) -> Iterator[Finding]:
     if kind in (None, "fixed"):
         return
     if kind not in ("revolute", "continuous", "prismatic"):
-        yield Finding(level=ERROR, text=f"joint '{name}' is {kind}; joints that move have to be revolute, continuous or prismatic")
+        yield Finding(
+            level=ERROR, text=f"joint '{name}' is {kind}; joints that move have to be revolute, continuous or prismatic"
+        )
         return
     if joint.find("mimic") is not None:
-        yield Finding(level=WARNING, text=f"joint '{name}' mimics another: here it is a joint of its own; list it in fixed_joints")
+        yield Finding(
+            level=WARNING, text=f"joint '{name}' mimics another: here it is a joint of its own; list it in fixed_joints"
+        )
     axis = joint.find("axis")
     xyz = np.array((axis.get("xyz", "1 0 0") if axis is not None else "1 0 0").split(), dtype=float)
     if not np.isclose(np.linalg.norm(xyz), 1.0, atol=1e-3):
@@ -152,12 +172,19 @@ def _joint(joint: ElementTree.Element) -> Iterator[Finding]:
     if limit is None and kind != "continuous":
         yield Finding(level=ERROR, text=f"joint '{name}' has no limit")
         return
-    values = {key: float(limit.get(key, "0")) for key in ("lower", "upper", "effort", "velocity")} if limit is not None else {}
+    values = (
+        {key: float(limit.get(key, "0")) for key in ("lower", "upper", "effort", "velocity")}
+        if limit is not None
+        else {}
+    )
     if kind != "continuous" and values["lower"] >= values["upper"]:
         yield Finding(level=ERROR, text=f"joint '{name}': its range {values['lower']} … {values['upper']} is empty")
     for key, unit in (("effort", "N·m"), ("velocity", "rad/s")):
         if not 0 < values.get(key, 0.0) < 1e4:
-            yield Finding(level=WARNING, text=f"joint '{name}': {key} limit {values.get(key, 0.0):g} {unit} says nothing about its motor")
+            yield Finding(
+                level=WARNING,
+                text=f"joint '{name}': {key} limit {values.get(key, 0.0):g} {unit} says nothing about its motor",
+            )
 
 
 # --- the folder ----------------------------------------------------------------------------------------------------------
@@ -169,7 +196,9 @@ def _folder(robot: Robot) -> Iterator[Finding]:
         yield Finding(level=ERROR, text=f"its mass is {robot.mass:.3g} kg, expected {_MASS[0]} … {_MASS[1]} kg")
     guesses = len(re.findall("GUESS", (robot.folder / "robot.yaml").read_text(encoding="utf-8")))
     if guesses:
-        yield Finding(level=NOTE, text=f"robot.yaml has {guesses} lines marked GUESS: confirm them and take the mark away")
+        yield Finding(
+            level=NOTE, text=f"robot.yaml has {guesses} lines marked GUESS: confirm them and take the mark away"
+        )
     yield from _pose(robot)
     yield from _motors(robot)
     yield from _models(robot)
@@ -228,7 +257,9 @@ def _motors(robot: Robot) -> Iterator[Finding]:
     effort, speed = model.effortLimit[JOINT_VELOCITY], model.velocityLimit[JOINT_VELOCITY]
     for j, name in enumerate(robot.joint_names):
         if 0 < effort[j] < 1e4 and abs(law.torque_max[j] / effort[j] - 1) > _SPEED_GAP:
-            yield Finding(level=WARNING, text=f"{name}: torque_max {law.torque_max[j]:g} N·m, but the URDF says {effort[j]:g}")
+            yield Finding(
+                level=WARNING, text=f"{name}: torque_max {law.torque_max[j]:g} N·m, but the URDF says {effort[j]:g}"
+            )
         if 0 < speed[j] < 1e3 and abs(law.no_load_speed[j] / speed[j] - 1) > _SPEED_GAP:
             text = f"{name}: without load it turns at {law.no_load_speed[j]:.1f} rad/s, but the URDF says {speed[j]:g}"
             yield Finding(level=WARNING, text=f"{text}: look at back_emf_constant, gear_ratio and bus_voltage")

@@ -50,7 +50,9 @@ def holding_rows(
         frame = frames[i]
         basis = taken.setdefault(int(model.frames[frame].parentJoint), [])
         x, y, z = data.oMf[frame].translation - data.oMi[model.frames[frame].parentJoint].translation
-        twist = np.array([[1.0, 0, 0, 0, z, -y], [0, 1.0, 0, -z, 0, x], [0, 0, 1.0, y, -x, 0]])  # of the link → of the point
+        twist = np.array(
+            [[1.0, 0, 0, 0, z, -y], [0, 1.0, 0, -z, 0, x], [0, 0, 1.0, y, -x, 0]]
+        )  # of the link → of the point
         for axis in range(3):
             row = twist[axis] / np.linalg.norm(twist[axis])
             rest = row - sum(((row @ b) * b for b in basis), np.zeros(6))

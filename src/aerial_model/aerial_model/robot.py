@@ -176,7 +176,9 @@ class Robot:
         """Indices of the joints that carry no contact point ``(n_a,)``: nothing but angular momentum needs them."""
         carrying = {joint for link in self.contact_links for joint in self.model.supports[int(link)]}
         joints = range(2, self.model.njoints)
-        return np.array([self.model.joints[j].idx_v - JOINT_VELOCITY.start for j in joints if j not in carrying], dtype=int)
+        return np.array(
+            [self.model.joints[j].idx_v - JOINT_VELOCITY.start for j in joints if j not in carrying], dtype=int
+        )
 
     def holding_rows(self, held: Sequence[bool]) -> tuple[tuple[int, int], ...]:
         """Return the pairs (contact point, axis) that suffice to hold points ``(n_c,)`` still; see ``contact``."""
@@ -240,7 +242,9 @@ def _read(folder: Path) -> tuple[dict[str, Any], tuple[Path, ...]]:
         layers.append(layer)
         parent = layer.pop("extends", None)
         if parent is not None and not isinstance(parent, str):
-            raise ConfigurationError(f"{folder / YAML_NAME}: extends: expected a robot's name or folder, found {parent!r}")
+            raise ConfigurationError(
+                f"{folder / YAML_NAME}: extends: expected a robot's name or folder, found {parent!r}"
+            )
         if parent is not None and parent not in known_robots():
             parent = folder / parent  # as everything a file names: relative to where it lies
         folder = None if parent is None else find_folder(parent)

@@ -77,7 +77,9 @@ def draft(urdf: Path, name: str, fixed_joints: Sequence[str] = ()) -> Draft:
     except (ValueError, RuntimeError) as error:
         raise ConfigurationError(f"{urdf}: not a URDF that Pinocchio can read ({error})") from None
     if model.njoints < 4:
-        raise ConfigurationError(f"{urdf}: a robot that jumps has legs; this one has {model.njoints - 2} joints that move")
+        raise ConfigurationError(
+            f"{urdf}: a robot that jumps has legs; this one has {model.njoints - 2} joints that move"
+        )
     return _Drafter(model, shapes, urdf, name, fixed_joints).draft()
 
 
@@ -112,14 +114,21 @@ class _Drafter:
         for point, frame, offset, radius in self._points(home):
             at = "" if not np.any(offset) else f", offset: [{', '.join(f'{x:.4g}' for x in offset)}]"
             lines.append(f"  - {{name: {point}, frame: {frame}, radius: {radius:.4g}{at}}}")
-        lines += ["", f"bus_voltage: {BUS_VOLTAGE} # [V] GUESS", "actuators: # GUESS: constants that give the URDF's limits"]
+        lines += [
+            "",
+            f"bus_voltage: {BUS_VOLTAGE} # [V] GUESS",
+            "actuators: # GUESS: constants that give the URDF's limits",
+        ]
         for kind, (joints, torque, speed, damping, friction) in kinds.items():
             lines += _actuator(kind, [names[j] for j in joints], torque, speed, damping, friction)
         lines += ["", "poses: # GUESS"]
         for pose, q in (("home", home), ("landing", landing), ("tuck", tuck)):
             lines.append(f"  {pose}: {{{', '.join(f'{n}: {x:.3f}' for n, x in zip(names, q, strict=True))}}}")
         frozen = [names[j] for j in self._frozen()]
-        lines += ["", f"frozen_joints: [{', '.join(frozen)}] # legs' joints that turn about other axes than the lateral one"]
+        lines += [
+            "",
+            f"frozen_joints: [{', '.join(frozen)}] # legs' joints that turn about other axes than the lateral one",
+        ]
         return Draft(text="\n".join(lines) + "\n", guesses=tuple(self._guesses))
 
     @property
@@ -135,7 +144,9 @@ class _Drafter:
         pin.framesForwardKinematics(model, data, q)
         ends = [j for j in range(2, model.njoints) if not len(model.children[j])]
         candidates = {j: self._end_points(j) for j in ends}
-        heights = {j: min(self._world(frame, offset)[2] for frame, offset in points) for j, points in candidates.items()}
+        heights = {
+            j: min(self._world(frame, offset)[2] for frame, offset in points) for j, points in candidates.items()
+        }
         floor = min(heights.values())
         self._leg = -floor if floor < 0 else 1.0  # from the base down [m]
         chosen = [j for j in ends if heights[j] < floor + _LOW * self._leg]
@@ -143,7 +154,9 @@ class _Drafter:
             raise ConfigurationError(
                 f"{self._urdf}: fewer than two limbs reach the ground with all joints at zero: no legs to guess"
             )
-        self._guesses.append(f"contact points: on {', '.join(model.names[j] for j in chosen)}, the lowest ends of limbs")
+        self._guesses.append(
+            f"contact points: on {', '.join(model.names[j] for j in chosen)}, the lowest ends of limbs"
+        )
         limbs = []
         for j in chosen:
             points = candidates[j]

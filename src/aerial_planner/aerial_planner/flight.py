@@ -99,7 +99,12 @@ def integrate_flight(
 
 
 def _legs(
-    path: FlightPath, start: np.ndarray, start_rate: np.ndarray, times: np.ndarray, duration: float, settling_time: float
+    path: FlightPath,
+    start: np.ndarray,
+    start_rate: np.ndarray,
+    times: np.ndarray,
+    duration: float,
+    settling_time: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return joint positions and rates ``(K, n)`` along the path at ``times`` ``(K,)``."""
     position, rate = path.at(start, times, duration)

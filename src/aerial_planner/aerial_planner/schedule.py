@@ -100,7 +100,9 @@ class Schedule:
     landing_centre: np.ndarray  # (3,) of the support at landing, in S, z: the surface [m]
     rotation: np.ndarray  # (3,) to accumulate from start to touchdown, as a rotation vector in S [rad]
     rotation_at_lift_off: float = 0.0  # share of it that the reference has behind it at lift-off
-    correction: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) of what to aim at, in the landed base [rad]
+    correction: np.ndarray = field(
+        default_factory=lambda: np.zeros(3)
+    )  # (3,) of what to aim at, in the landed base [rad]
 
     @property
     def take_off_time(self) -> float:

@@ -87,7 +87,9 @@ def build(robot: Robot, terrain: Terrain, physics_dt: float) -> World:
         trunk_name = root.name
         model = spec.compile()
     except (ValueError, RuntimeError) as error:
-        raise ConfigurationError(f"{robot.description.path}: MuJoCo cannot use it ({' '.join(str(error).split())})") from None
+        raise ConfigurationError(
+            f"{robot.description.path}: MuJoCo cannot use it ({' '.join(str(error).split())})"
+        ) from None
     return World(
         model=model,
         terrain=terrain,
@@ -113,7 +115,13 @@ def _urdf_with_looks(robot: Robot) -> str:
             if mesh is not None and (shape.tag == "collision" or not _readable(mesh.get("filename"))):
                 link.remove(shape)  # collision meshes come back as hulls
         _make_positive(link.find("inertial/inertia"))
-    settings = {"discardvisual": "false", "fusestatic": "true", "meshdir": str(robot.folder), "strippath": "false", "balanceinertia": "true"}
+    settings = {
+        "discardvisual": "false",
+        "fusestatic": "true",
+        "meshdir": str(robot.folder),
+        "strippath": "false",
+        "balanceinertia": "true",
+    }
     ElementTree.SubElement(ElementTree.SubElement(tree, "mujoco"), "compiler", settings)
     return ElementTree.tostring(tree, encoding="unicode")
 

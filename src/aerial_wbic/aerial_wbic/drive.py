@@ -64,7 +64,14 @@ class Drive:
         """
         velocity = v_ref[JOINT_VELOCITY]
         torque, saturated = _torque(
-            state, solution, velocity, measurement.joint_velocity, self._joint_damping, self._share, self._arms, self._law
+            state,
+            solution,
+            velocity,
+            measurement.joint_velocity,
+            self._joint_damping,
+            self._share,
+            self._arms,
+            self._law,
         )
         if saturated < 0:
             return self.resting(None, measurement)

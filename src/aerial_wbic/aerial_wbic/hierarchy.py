@@ -17,7 +17,9 @@ import numpy as np
 from aerial_model.compiled import cholesky, cholesky_solve, compiled
 
 # Eigenvalues of J H⁻¹ Jᵀ, inverse inertias [1/kg].
-MOVABLE = 0.01  # a direction that moves this much less than the robot as a whole is accelerated by half of what is asked
+MOVABLE = (
+    0.01  # a direction that moves this much less than the robot as a whole is accelerated by half of what is asked
+)
 NOISE = 1e-9  # a direction below this is left to lower tasks
 _CERTAIN = 10.0  # times as movable: damping would change a hundredth
 EFFORT = 1e-3  # ε of weighted tasks [1/kg]: settles what none of them asks for, and hardly weighs on what they do

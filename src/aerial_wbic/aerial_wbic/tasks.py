@@ -268,9 +268,7 @@ def angular_momentum_task(state: Configuration, target: WholeBodyTarget, damping
     # As the speed of the robot's mass at its radius of gyration: of the same size as what other tasks say.
     inertia = (state.A_G[ANGULAR, BASE_ANGULAR] * state.R_WB).sum() / 3  # mean of those with joints locked
     unit = np.sqrt(state.mass * inertia)
-    return Task(
-        state.A_G[ANGULAR] / unit, (alphadot - state.Adot_v_G[ANGULAR]) / unit, target.angular_momentum / unit
-    )
+    return Task(state.A_G[ANGULAR] / unit, (alphadot - state.Adot_v_G[ANGULAR]) / unit, target.angular_momentum / unit)
 
 
 @compiled

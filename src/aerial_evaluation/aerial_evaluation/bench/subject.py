@@ -17,7 +17,9 @@ from aerial_planner.planner import Planner
 from aerial_planner.schedule import Schedule, contact_schedule, known_motions, load_motion
 from aerial_planner.settings import PlannerSettings
 
-FORWARD = 0.4  # where a motion goes that neither turns nor travels unless told to, for a robot of the reference size [m]
+FORWARD = (
+    0.4  # where a motion goes that neither turns nor travels unless told to, for a robot of the reference size [m]
+)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,7 +15,11 @@ def variants(subject: Subject) -> list[Row]:
     """
     rows = []
     for motion in subject.motions:
-        requests = [usual_request(motion, subject.robot, variant, warm_start=warm) for variant in Variant for warm in (False, True)]
+        requests = [
+            usual_request(motion, subject.robot, variant, warm_start=warm)
+            for variant in Variant
+            for warm in (False, True)
+        ]
         subject.progress(f"variants of {motion}: building")
         for request in requests:
             subject.planner.warm_up(request)

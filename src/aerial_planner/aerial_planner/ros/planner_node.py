@@ -99,7 +99,9 @@ class PlannerNode(node.AerialNode):
         """Take selections from now on; build the problems of motions meanwhile."""
         self._active = True
         asked = self.get_parameter("warm_up").value
-        self._prepare(list(known_motions(self._robot)) if asked == "all" else [name for name in asked.split(",") if name])
+        self._prepare(
+            list(known_motions(self._robot)) if asked == "all" else [name for name in asked.split(",") if name]
+        )
 
     def deactivate(self) -> None:
         """Take no more selections."""
