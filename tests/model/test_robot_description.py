@@ -59,7 +59,7 @@ actuators: {elbow: {joints: []}}
 
 
 def test_a_fixed_joint_that_is_misspelt_is_named(variant):
-    with pytest.raises(ConfigurationError, match="no joint 'r_elbw'.*did you mean 'r_elbow'"):
+    with pytest.raises(ConfigurationError, match=r"no joint 'r_elbw'.*did you mean 'r_elbow'"):
         variant("name: stiff\nextends: mit_humanoid\nfixed_joints: [r_elbw]\n")
 
 

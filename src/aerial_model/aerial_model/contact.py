@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import numpy as np
 import pinocchio as pin
 
-
 _INDEPENDENT = 0.02  # least share of a row that others do not say; lengths of feet are centimetres
 
 

@@ -30,7 +30,6 @@ from aerial_wbic.target import GRAVITY, Fold, PostureTarget, WholeBodyTarget
 from aerial_wbic.tasks import Arrangement, Limbs, attitude_error, command
 from aerial_wbic.touchdown import ContactSense
 
-
 _DEPTH_SHARE = 0.85  # of the depth to which legs can bend that a landing may use
 
 

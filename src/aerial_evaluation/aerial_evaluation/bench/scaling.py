@@ -20,7 +20,6 @@ def knots(subject: Subject) -> list[Row]:
     rows = []
     settings = subject.planner.settings
     for motion in subject.motions:
-        request = usual_request(motion, subject.robot)
         usual = usual_schedule(motion, subject.robot, settings)
         for wanted in KNOTS:
             dt = usual.take_off_time / wanted
