@@ -186,3 +186,24 @@ def test_select_says_when_nobody_is_there(aerial):
     assert ended.status == 1
     assert ended.figures["refusal"]["code"] == "timeout"
     assert "./aerial up" in json.dumps(ended.figures)
+
+
+def test_a_urdf_becomes_a_robot_that_is_checked(aerial, tmp_path):
+    urdf, folder = known_robots()["mini_cheetah"] / "robot.urdf", tmp_path / "mine"
+    drafted = aerial("draft", urdf, "--out", folder, "--json")
+    assert drafted.status == 0
+    assert drafted.figures["guesses"]
+    checked = aerial("check", folder, "--json")
+    assert checked.status == 0
+    assert not any(finding["level"] == "error" for finding in checked.figures["findings"])
+    again = aerial("draft", urdf, "--out", folder)
+    assert again.status == 1
+    assert "a draft does not overwrite" in again.errors
+
+
+def test_a_check_that_finds_something_to_mend_fails(aerial, tmp_path):
+    urdf = tmp_path / "bad.urdf"
+    urdf.write_text((known_robots()["mini_cheetah"] / "robot.urdf").read_text().replace('value="3.3"', 'value="-3.3"'))
+    ended = aerial("check", urdf)
+    assert ended.status == 1
+    assert "link 'base': its mass is -3.3 kg" in ended.output
