@@ -11,9 +11,8 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, Robot
-
-_ANGULAR_FIRST = [3, 4, 5, 0, 1, 2]
+from aerial_model.compiled import compiled
+from aerial_model.robot import BASE_ANGULAR, BASE_LINEAR, BASE_ORIENTATION, BASE_POSITION, Robot
 
 
 class Configuration(NamedTuple):
@@ -37,6 +36,7 @@ class Configuration(NamedTuple):
     contact_positions: np.ndarray  # centres of the contact spheres c_i (n_c, 3) [m]
     J_contacts: np.ndarray  # (n_c, 3, nv) with ċ_i = J_c,i q̇
     Jdot_v_contacts: np.ndarray  # J̇_c,i q̇ (n_c, 3) [m/s²]: the points' classical accelerations at q̈ = 0
+    omega_contacts: np.ndarray  # angular velocities of the links the points are on (n_c, 3) [rad/s]
 
     @property
     def base_position(self) -> np.ndarray:
@@ -54,49 +54,140 @@ class Configuration(NamedTuple):
         return self.J_contacts @ self.v
 
 
+class _Workspace(NamedTuple):
+    """Pinocchio's own memory, which compiled code reads from: to look it up anew takes longer than to copy it."""
+
+    R_WB: np.ndarray  # (3, 3)
+    M: np.ndarray  # upper triangle (nv, nv)
+    M_inv: np.ndarray  # upper triangle (nv, nv)
+    nle: np.ndarray  # (nv,)
+    com: np.ndarray  # (3,)
+    com_velocity: np.ndarray  # (3,)
+    A_G: np.ndarray  # linear rows first (6, nv)
+    Adot_G: np.ndarray  # the same
+    angular_momentum: np.ndarray  # (3,)
+    J: np.ndarray  # of every joint's spatial velocity at W's origin, linear rows first (6, nv)
+    Jdot: np.ndarray  # the same
+
+
 class Kinematics:
     """Computes configurations of one robot in one Pinocchio workspace."""
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self._data = data = robot.model.createData()
-        self._zero = np.zeros(robot.model.nv)
-        self._below_diagonal = np.tri(robot.model.nv, k=-1, dtype=bool)
-        # Pinocchio's own memory, which ``at`` copies from: to look it up anew takes longer than to copy it.
-        self._rotation, self._M, self._M_inv, self._nle = data.oMi[1].rotation, data.M, data.Minv, data.nle
-        self._com, self._com_velocity, self._A_G = data.com[0], data.vcom[0], data.Ag
-        self._bias, self._angular_momentum = (data.dhg.angular, data.dhg.linear), data.hg.angular
+        model = robot.model
+        self._data = data = model.createData()
+        self._workspace = _Workspace(
+            data.oMi[1].rotation,
+            data.M,
+            data.Minv,
+            data.nle,
+            data.com[0],
+            data.vcom[0],
+            data.Ag,
+            data.dAg,
+            data.hg.angular,
+            data.J,
+            data.dJ,
+        )
         self._contacts = [data.oMf[frame].translation for frame in robot.contact_frames]
+        self._moving = np.zeros((len(self._contacts), model.nv), dtype=bool)  # which velocities move which contact point
+        for i, frame in enumerate(robot.contact_frames):
+            for joint in list(model.supports[model.frames[frame].parentJoint])[1:]:  # 0: the universe
+                first = model.joints[joint].idx_v
+                self._moving[i, first : first + model.joints[joint].nv] = True
 
     def at(self, q: np.ndarray, v: np.ndarray) -> Configuration:
         """Return the robot at ``q`` ``(nq,)`` with velocity ``v`` ``(nv,)``."""
-        model, data, frames = self.robot.model, self._data, self.robot.contact_frames
+        model, data = self.robot.model, self._data
         pin.computeMinverse(model, data, q)
-        pin.computeAllTerms(model, data, q, v)
-        # Second order at zero acceleration: the bias terms J̇ q̇ and Ȧ_G q̇.
-        pin.computeCentroidalMomentumTimeVariation(model, data, q, v, self._zero)
+        pin.crba(model, data, q)
+        pin.nonLinearEffects(model, data, q, v)
+        pin.dccrba(model, data, q, v)
         pin.updateFramePlacements(model, data)
-        axes = pin.LOCAL_WORLD_ALIGNED
-        return Configuration(
-            q=q,
-            v=v,
-            mass=self.robot.mass,
-            R_WB=self._rotation.copy(),
-            M=self._symmetric(self._M),
-            M_inv=self._symmetric(self._M_inv),
-            nle=self._nle.copy(),
-            com=self._com.copy(),
-            com_velocity=self._com_velocity.copy(),
-            A_G=self._A_G.take(_ANGULAR_FIRST, axis=0),
-            Adot_v_G=np.concatenate(self._bias),
-            angular_momentum=self._angular_momentum.copy(),
-            contact_positions=np.array(self._contacts),
-            J_contacts=np.array([pin.getFrameJacobian(model, data, frame, axes)[:3] for frame in frames]),
-            Jdot_v_contacts=np.array(
-                [pin.getFrameClassicalAcceleration(model, data, frame, axes).linear for frame in frames]
-            ),
-        )
+        return _configuration(q, v, self.robot.mass, self._workspace, np.array(self._contacts), self._moving)
 
-    def _symmetric(self, upper: np.ndarray) -> np.ndarray:
-        """Return the symmetric matrix of which Pinocchio gives the upper triangle."""
-        return np.where(self._below_diagonal, upper.T, upper)
+
+@compiled
+def _configuration(
+    q: np.ndarray, v: np.ndarray, mass: float, workspace: _Workspace, contacts: np.ndarray, moving: np.ndarray
+) -> Configuration:
+    nv, n_c = len(v), len(contacts)
+    M, M_inv = np.empty((nv, nv)), np.empty((nv, nv))
+    A_G, Adot_v_G = np.empty((6, nv)), np.zeros(6)
+    for i in range(nv):
+        for j in range(i, nv):
+            M[i, j] = M[j, i] = workspace.M[i, j]
+            M_inv[i, j] = M_inv[j, i] = workspace.M_inv[i, j]
+    for row in range(6):
+        other = (row + 3) % 6  # Pinocchio has linear rows first
+        for k in range(nv):
+            A_G[row, k] = workspace.A_G[other, k]
+            Adot_v_G[row] += workspace.Adot_G[other, k] * v[k]
+    J, bias, omega = np.zeros((n_c, 3, nv)), np.zeros((n_c, 3)), np.zeros((n_c, 3))
+    turn, turn_rate, velocity = np.empty(3), np.empty(3), np.empty(3)
+    for i in range(n_c):
+        c = contacts[i]
+        turn_rate[:] = 0.0
+        velocity[:] = 0.0
+        for k in range(nv):
+            if not moving[i, k]:
+                continue
+            column, rate = workspace.J[:, k], workspace.Jdot[:, k]
+            turn[0] = column[4] * c[2] - column[5] * c[1]  # ω × c of this column
+            turn[1] = column[5] * c[0] - column[3] * c[2]
+            turn[2] = column[3] * c[1] - column[4] * c[0]
+            for axis in range(3):
+                J[i, axis, k] = column[axis] + turn[axis]
+                velocity[axis] += J[i, axis, k] * v[k]
+                omega[i, axis] += column[3 + axis] * v[k]
+                bias[i, axis] += rate[axis] * v[k]
+                turn_rate[axis] += rate[3 + axis] * v[k]
+        # ċ = v_O + ω × c has the rate v̇_O + ω̇ × c + ω × ċ.
+        w = omega[i]
+        bias[i, 0] += turn_rate[1] * c[2] - turn_rate[2] * c[1] + w[1] * velocity[2] - w[2] * velocity[1]
+        bias[i, 1] += turn_rate[2] * c[0] - turn_rate[0] * c[2] + w[2] * velocity[0] - w[0] * velocity[2]
+        bias[i, 2] += turn_rate[0] * c[1] - turn_rate[1] * c[0] + w[0] * velocity[1] - w[1] * velocity[0]
+    return Configuration(
+        q,
+        v,
+        mass,
+        workspace.R_WB.copy(),
+        M,
+        M_inv,
+        workspace.nle.copy(),
+        workspace.com.copy(),
+        workspace.com_velocity.copy(),
+        A_G,
+        Adot_v_G,
+        workspace.angular_momentum.copy(),
+        contacts,
+        J,
+        bias,
+        omega,
+    )
+
+
+@compiled
+def carry(state: Configuration, position: np.ndarray, velocity: np.ndarray) -> None:
+    """Move a configuration whose base is at W's origin and linearly at rest, in place, to where it is and how fast.
+
+    Shape, attitude and what turns stay. A velocity V that all points share is constant in B, as q̈ = 0 has it, only if in W
+    it changes by ω × V: that is what the bias terms gain.
+
+    Args:
+        state: whose arrays change.
+        position: of the base ``(3,)`` [m] in W.
+        velocity: of the base, V ``(3,)`` [m/s] in W.
+    """
+    in_base = velocity @ state.R_WB
+    state.q[BASE_POSITION] = position
+    state.v[BASE_LINEAR] = in_base
+    state.com[:] += position
+    state.com_velocity[:] += velocity
+    state.contact_positions[:] += position
+    turning = np.cross(state.v[BASE_ANGULAR], in_base)
+    state.nle[:] += np.ascontiguousarray(state.M[:, BASE_LINEAR]) @ turning
+    gained = state.R_WB @ turning
+    state.Adot_v_G[3:] += state.mass * gained
+    state.Jdot_v_contacts[:] += gained

@@ -64,12 +64,11 @@ class Controller:
         self._gains = _within_reach(robot.section("controller", ControllerGains), robot)
         self._limbs = Limbs(robot)
         self._arrangement = Arrangement.of(self._gains)
-        self._kinematics = Kinematics(robot)
         gains = self._gains
         self._qp = ForceOptimization(robot, gains.weight_base, gains.weight_force, SOLVERS[gains.qp_solver])
         self._estimator = Estimator(robot, self._gains.estimator)
         self._sense = ContactSense(robot, gains.touchdown_sensing, gains.stiction_speed)
-        self._home_height = _home_height(robot, self._kinematics)
+        self._home_height = _home_height(robot)
         self.reset()
         self._rehearse()
         self.reset()
@@ -91,7 +90,7 @@ class Controller:
         self._ticks += 1
         self._phases.tick(measurement.time)
         self.estimate = self._estimator.update(measurement, self._phases.contacts())
-        state = self._kinematics.at(self.estimate.q, self.estimate.v)
+        state = self._estimator.state
         self._feel(state, measurement)
         target = self._phases.target(state)
         self._now = (state, target)
@@ -229,7 +228,7 @@ def _within_reach(gains: ControllerGains, robot: Robot) -> ControllerGains:
     return replace(gains, landing_depth=min(gains.landing_depth, depth))
 
 
-def _home_height(robot: Robot, kinematics: Kinematics) -> float:
+def _home_height(robot: Robot) -> float:
     """Return the height of the centre of mass above the ground in the home pose [m]."""
-    state = kinematics.at(robot.standing_configuration("home"), np.zeros(robot.model.nv))
+    state = Kinematics(robot).at(robot.standing_configuration("home"), np.zeros(robot.model.nv))
     return float(state.com[2])

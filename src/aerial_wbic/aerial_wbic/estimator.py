@@ -21,7 +21,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
 from aerial_model.compiled import (
     cholesky,
@@ -33,15 +32,8 @@ from aerial_model.compiled import (
     quaternion,
     vector,
 )
-from aerial_model.robot import (
-    BASE_ANGULAR,
-    BASE_LINEAR,
-    BASE_ORIENTATION,
-    BASE_POSITION,
-    JOINT_POSITION,
-    JOINT_VELOCITY,
-    Robot,
-)
+from aerial_model.kinematics import Configuration, Kinematics, carry
+from aerial_model.robot import BASE_ANGULAR, BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY, Robot
 from aerial_model.state import Estimate, Measurement
 from aerial_wbic.gains import EstimatorNoise
 from aerial_wbic.target import GRAVITY
@@ -61,14 +53,6 @@ class Belief(NamedTuple):
     loaded_since: np.ndarray  # (n_c,) [s]
 
 
-class Legs(NamedTuple):
-    """Forward kinematics in W's axes, from the base's centre."""
-
-    offset: np.ndarray  # R p_i (n_c, 3) [m]
-    twist: np.ndarray  # of the points' links at the points, linear R (ω × p_i + ṗ_i) first (n_c, 6) [m/s, rad/s]
-    radius: np.ndarray  # of the contact spheres (n_c,) [m]
-
-
 class Estimator:
     """Kalman filter over one robot's base and contact points.
 
@@ -78,17 +62,17 @@ class Estimator:
     """
 
     def __init__(self, robot: Robot, noise: EstimatorNoise) -> None:
-        self._robot = robot
+        self.kinematics = Kinematics(robot)
+        self.state: Configuration | None = None  # the robot at the estimate; None before the first
         self._noise = noise
-        self._data = robot.model.createData()
-        self._q = np.zeros(robot.model.nq)  # base at the origin
-        self._v = np.zeros(robot.model.nv)
+        self._nq, self._nv = robot.model.nq, robot.model.nv
         self._radius = np.array([point.radius for point in robot.contact_points])  # (n_c,) [m]
         self.reset()
 
     def reset(self) -> None:
         """Forget everything; the next measurement puts the support's centre at the origin of W, unless it is localized."""
         self._time: float | None = None
+        self.state = None
 
     def update(self, measurement: Measurement, contact: np.ndarray) -> Estimate:
         """Return the estimate at the measurement's time.
@@ -98,7 +82,7 @@ class Estimator:
             contact: points the schedule has on the ground ``(n_c,)`` bool.
         """
         if self._time is None:
-            self._belief = self._begin(measurement)
+            self._belief = _nothing(measurement.orientation, len(self._radius))
         else:
             _predict(
                 self._belief,
@@ -109,58 +93,52 @@ class Estimator:
                 measurement.orientation,
                 self._noise,
             )
+        self.state = self._seen(measurement)
+        if self._time is None:
+            self._begin(measurement)
         self._time = measurement.time
         self._gyro = measurement.angular_velocity
         if measurement.localization is not None:
             _correct_position(self._belief, measurement.localization, self._noise)
-        q, v = np.empty_like(self._q), np.empty_like(self._v)
-        q[JOINT_POSITION] = measurement.joint_position
-        v[BASE_ANGULAR] = measurement.angular_velocity
-        v[JOINT_VELOCITY] = measurement.joint_velocity
-        _correct(self._belief, self._legs(measurement), contact, measurement.time, self._noise, q, v)
+        _correct(self._belief, self.state, self._radius, contact, measurement.time, self._noise)
         return Estimate(
             time=measurement.time,
-            q=q,
-            v=v,
+            q=self.state.q,
+            v=self.state.v,
             position_variance=float(self._belief.P[P, P]),
             velocity_variance=float(self._belief.P[V, V]),
         )
 
-    def _begin(self, measurement: Measurement) -> Belief:
-        n_c = len(self._radius)
-        belief = Belief(
-            orientation=np.array(measurement.orientation, dtype=float),
-            X=np.zeros((FEET + n_c, 3)),
-            P=np.zeros((FEET + n_c, FEET + n_c)),
-            roll=np.zeros((n_c, 3)),
-            loaded_since=np.full(n_c, -np.inf),  # a robot that is switched on stands firmly
-        )
-        self._belief = belief
-        offset = self._legs(measurement).offset
+    def _seen(self, measurement: Measurement) -> Configuration:
+        """Return the robot as the sensors and the believed attitude have it, its base at the origin and linearly at rest."""
+        q, v = np.zeros(self._nq), np.zeros(self._nv)
+        q[BASE_ORIENTATION] = self._belief.orientation
+        q[JOINT_POSITION] = measurement.joint_position
+        v[BASE_ANGULAR] = measurement.angular_velocity
+        v[JOINT_VELOCITY] = measurement.joint_velocity
+        return self.kinematics.at(q, v)
+
+    def _begin(self, measurement: Measurement) -> None:
+        belief, offset = self._belief, self.state.contact_positions
         belief.X[P] = [0.0, 0.0, self._radius.mean()] - offset.mean(axis=0)
         belief.P[P, P] = self._noise.foot_position**2  # the attitude's error moves all offsets alike: no mean over feet
         if measurement.localization is not None:
             belief.X[P] = measurement.localization
             belief.P[P, P] = self._noise.localization**2
         belief.P[V, V] = self._noise.foot_velocity**2
-        for i in range(n_c):
+        for i in range(len(offset)):
             _anchor(belief, i, offset[i], self._noise)
-        return belief
 
-    def _legs(self, measurement: Measurement) -> Legs:
-        q, v = self._q, self._v
-        q[BASE_ORIENTATION] = self._belief.orientation
-        q[JOINT_POSITION] = measurement.joint_position
-        v[BASE_ANGULAR] = measurement.angular_velocity
-        v[JOINT_VELOCITY] = measurement.joint_velocity
-        model, data, frames = self._robot.model, self._data, self._robot.contact_frames
-        pin.forwardKinematics(model, data, q, v)
-        axes = pin.LOCAL_WORLD_ALIGNED
-        return Legs(
-            offset=np.array([pin.updateFramePlacement(model, data, frame).translation for frame in frames]),
-            twist=np.array([pin.getFrameVelocity(model, data, frame, axes).vector for frame in frames]),
-            radius=self._radius,
-        )
+
+def _nothing(orientation: np.ndarray, n_c: int) -> Belief:
+    """Return the belief in an attitude ``(4,)`` and nothing else yet."""
+    return Belief(
+        orientation=np.array(orientation, dtype=float),
+        X=np.zeros((FEET + n_c, 3)),
+        P=np.zeros((FEET + n_c, FEET + n_c)),
+        roll=np.zeros((n_c, 3)),
+        loaded_since=np.full(n_c, -np.inf),  # a robot that is switched on stands firmly
+    )
 
 
 @compiled
@@ -205,23 +183,18 @@ def _draw(orientation: np.ndarray, towards: np.ndarray, share: float) -> None:
 
 @compiled
 def _correct(
-    belief: Belief,
-    legs: Legs,
-    contact: np.ndarray,
-    time: float,
-    noise: EstimatorNoise,
-    q: np.ndarray,
-    v: np.ndarray,
+    belief: Belief, state: Configuration, radius: np.ndarray, contact: np.ndarray, time: float, noise: EstimatorNoise
 ) -> None:
-    """Let the loaded points measure; write the pose of the base into q ``(nq,)``, its linear velocity into v ``(nv,)``."""
-    _correct_by_legs(belief, legs, contact, time, noise)
-    q[BASE_POSITION] = belief.X[P]
-    q[BASE_ORIENTATION] = belief.orientation
-    v[BASE_LINEAR] = belief.X[V] @ np.array(matrix_of(quaternion(belief.orientation)))
+    """Let the loaded points of a robot seen from its base measure; then move it to where it is believed to be."""
+    _correct_by_legs(belief, state, radius, contact, time, noise)
+    carry(state, belief.X[P].copy(), belief.X[V].copy())
 
 
 @compiled
-def _correct_by_legs(belief: Belief, legs: Legs, contact: np.ndarray, time: float, noise: EstimatorNoise) -> None:
+def _correct_by_legs(
+    belief: Belief, state: Configuration, radius: np.ndarray, contact: np.ndarray, time: float, noise: EstimatorNoise
+) -> None:
+    """Kalman update by forward kinematics: R p_i are the contact positions, R (ω × p_i + ṗ_i) the contact velocities."""
     X = belief.X
     loaded = np.flatnonzero(contact)
     n = len(loaded)
@@ -233,12 +206,12 @@ def _correct_by_legs(belief: Belief, legs: Legs, contact: np.ndarray, time: floa
     variance = np.empty(n + 1)
     for row, i in enumerate(loaded):
         # A sphere that rolls without slip on level ground has its centre moving at ω × (0, 0, radius).
-        belief.roll[i, 0] = legs.twist[i, 4] * legs.radius[i]
-        belief.roll[i, 1] = -legs.twist[i, 3] * legs.radius[i]
-        slip[row] = belief.roll[i] - legs.twist[i, :3] - X[V]
+        belief.roll[i, 0] = state.omega_contacts[i, 1] * radius[i]
+        belief.roll[i, 1] = -state.omega_contacts[i, 0] * radius[i]
+        slip[row] = belief.roll[i] - state.J_contacts[i] @ state.v - X[V]
         distrust = _distrust(belief, i, slip[row], time, noise)
         if distrust > 1.0:
-            _anchor(belief, i, legs.offset[i], noise)
+            _anchor(belief, i, state.contact_positions[i], noise)
         variance[row] = distrust
     # The points' velocities measure the same v: their mean, weighted by trust, stands for all.
     trust = 1.0 / variance[:n]
@@ -247,7 +220,7 @@ def _correct_by_legs(belief: Belief, legs: Legs, contact: np.ndarray, time: floa
     H[n, V] = 1.0
     for row, i in enumerate(loaded):
         H[row, FEET + i] = -1.0
-        innovation[row] = X[FEET + i] - legs.offset[i] - X[P]  # of 0 = p + R p_i − c_i
+        innovation[row] = X[FEET + i] - state.contact_positions[i] - X[P]  # of 0 = p + R p_i − c_i
     innovation[n] = trust @ slip / trust.sum()
     variance[:n] *= noise.foot_position**2
     in_motion = noise.foot_velocity_share**2 * (X[V] @ X[V])  # common to all points: no mean over them

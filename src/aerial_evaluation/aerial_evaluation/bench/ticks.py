@@ -65,11 +65,12 @@ class TimedController(Controller):
 
     def __init__(self, robot: Robot) -> None:
         self.times: dict[str, list[float]] = {part: [] for part in PARTS}
+        self._counted = 0.0  # time of all parts so far [s]
         super().__init__(robot)
         for times in self.times.values():
             times.clear()  # those of the rehearsal
         self._estimator.update = self._timed("estimate", self._estimator.update)
-        self._kinematics.at = self._timed("kinematics", self._kinematics.at)
+        self._estimator.kinematics.at = self._timed("kinematics", self._estimator.kinematics.at)
         self._phases.target = self._timed("target", self._phases.target)
         self._accelerations = self._timed("hierarchy", self._accelerations)
         self._qp.solve = self._timed("qp", self._qp.solve)
@@ -85,9 +86,12 @@ class TimedController(Controller):
 
     def _timed(self, part: str, call: Callable[..., Any]) -> Callable[..., Any]:
         def timed(*args: Any) -> Any:
+            within = self._counted
             began = time.thread_time()
             result = call(*args)
-            self.times[part][-1] += time.thread_time() - began
+            lasted = time.thread_time() - began
+            self.times[part][-1] += lasted - (self._counted - within)  # what parts inside of it took is theirs
+            self._counted = within + lasted
             return result
 
         return timed
