@@ -1,8 +1,7 @@
 import numpy as np
-import pinocchio as pin
 import pytest
 
-from aerial_model.posture import crouch_depth, giving_way, points_from_com, reaching
+from aerial_model.posture import crouch_depth, points_from_com, reaching
 from aerial_model.robot import Robot
 
 
@@ -33,26 +32,3 @@ def test_legs_bend_as_deep_as_their_range_lets_them(robot):
     assert 0.05 < depth < -points[:, 2].max()
     deeper = points + [0.0, 0.0, 1.05 * depth + 0.005]
     assert reaching(robot, deeper, robot.poses["home"])[1] > 1e-3
-
-
-def test_limbs_give_way_as_fast_as_their_length_changes(robot):
-    def lengths(pose):
-        points = robot.contact_positions(np.concatenate([np.zeros(6), [1.0], pose]))
-        links = np.unique(robot.contact_links)
-        model, data = robot.model, robot.model.createData()
-        pin.forwardKinematics(model, data, np.concatenate([np.zeros(6), [1.0], pose]))
-        hips = [data.oMi[list(model.supports[int(link)])[2]].translation for link in links]
-        centres = [points[robot.contact_links == link].mean(axis=0) for link in links]
-        return np.array([np.linalg.norm(c - h) for c, h in zip(centres, hips, strict=True)])
-
-    pose, step = robot.poses["landing"], 1e-6
-    slopes = [(lengths(pose + d) - lengths(pose - d)) / (2 * step) for d in step * np.eye(robot.n_joints)]
-    np.testing.assert_allclose(giving_way(robot, pose), np.linalg.norm(slopes, axis=0), atol=1e-8)
-
-
-def test_a_straight_limb_does_not_give_way(robot):
-    straight = robot.poses["home"].copy()
-    for k, name in enumerate(robot.joint_names):
-        if not ("shoulder" in name or "elbow" in name):
-            straight[k] = 0.0
-    assert np.all(giving_way(robot, straight) < 0.4 * giving_way(robot, robot.poses["home"]))

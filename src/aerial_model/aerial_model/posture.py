@@ -48,28 +48,6 @@ def reaching(robot: Robot, points: np.ndarray, guess: np.ndarray) -> tuple[np.nd
     return q_j, float(left.max())
 
 
-def giving_way(robot: Robot, pose: np.ndarray) -> np.ndarray:
-    """Return how fast each limb on the ground shortens per joint motion, ‖∂ℓ/∂q_j‖ ``(n_links,)`` [m/rad].
-
-    ℓ is the distance from a limb's first joint to the centre of the contact points at its end. A straight limb is a strut,
-    0: it takes an impact at whatever force that needs. The more it is bent, the more softly it gives way.
-    """
-    model, data = robot.model, robot.model.createData()
-    q = np.concatenate([np.zeros(6), [1.0], pose])
-    pin.computeJointJacobians(model, data, q)
-    pin.updateFramePlacements(model, data)
-    rates = []
-    for link in np.unique(robot.contact_links):
-        frames = [frame for frame, of in zip(robot.contact_frames, robot.contact_links, strict=True) if of == link]
-        first = list(model.supports[model.frames[frames[0]].parentJoint])[2]  # 0: universe, 1: base
-        centre = np.mean([data.oMf[frame].translation for frame in frames], axis=0)
-        axes = pin.LOCAL_WORLD_ALIGNED
-        J = np.mean([pin.getFrameJacobian(model, data, frame, axes)[:3] for frame in frames], axis=0)
-        along = centre - data.oMi[first].translation
-        rates.append(np.linalg.norm(along @ J[:, BASE_TWIST.stop :]) / np.linalg.norm(along))
-    return np.array(rates)
-
-
 def crouch_depth(robot: Robot, pose: np.ndarray) -> float:
     """Return how far the centre of mass can sink [m], level and straight down, from over the support in ``pose`` ``(n,)``.
 

@@ -8,7 +8,6 @@ import casadi as ca
 import numpy as np
 
 from aerial_model import rotation
-from aerial_model.posture import giving_way
 from aerial_model.robot import BASE_ORIENTATION, JOINT_POSITION, Robot
 from aerial_planner.inverse_kinematics import InverseKinematics
 from aerial_planner.schedule import GRAVITY, Schedule
@@ -25,7 +24,6 @@ _FOLDING_SPEED = 0.55  # share of the no-load speed the legs may take; a short f
 _SMOOTH_STEP_PEAK = 1.5  # greatest slope of the smooth step
 _LONG_SUPPORT = 0.4  # half the length of a support, over the height, that catches the robot by itself
 _DROP_MAX, _DROP_STEP = 0.2, 0.02  # by which it may land lower, as a share of the height
-_GIVING_SHARE = 0.8  # of how softly legs give way in the level landing pose that they keep when their feet are set ahead
 _REACHED = 2e-3  # [m] that feet may miss in the landing pose
 _PUSHED = 0.3  # share of the take-off that it lasts at lift-off speed, on average
 _NEARBY = 1e-9  # [m]
@@ -177,18 +175,14 @@ def _landing_pose(
 ) -> tuple[np.ndarray, float]:
     """Return the pose ``(n,)`` [rad] that has the feet ``(n_c, 3)`` [m] from the centre of mass, in B, and its drop [m].
 
-    Legs that do not reach so far ahead, or only so straight that they could not give way to the impact, let the centre of
-    mass come down lower.
+    Legs that do not reach so far ahead let the centre of mass come down lower.
     """
     depths = np.arange(0.0, _DROP_MAX, _DROP_STEP) * height
     targets = feet + np.array([0.0, 0.0, 1.0]) * depths[:, None, None]
     poses = ik.solve(targets, robot.poses["landing"])
     relative = np.array([np.asarray(model.feet(q) - ca.repmat(model.com(q), 1, len(feet))).T for q in poses])
     missing = np.linalg.norm(relative - targets, axis=2).max(axis=1)
-    reached = missing < _REACHED
-    enough = _GIVING_SHARE * giving_way(robot, robot.poses["landing"])
-    soft = reached & [bool(np.all(giving_way(robot, pose) >= enough)) for pose in poses]
-    best = int(next((np.argmax(fits) for fits in (soft, reached) if fits.any()), np.argmin(missing)))
+    best = int(np.argmax(missing < _REACHED)) if np.any(missing < _REACHED) else int(np.argmin(missing))
     return poses[best], float(depths[best])
 
 
