@@ -57,11 +57,12 @@ def test_what_cannot_be_measured_is_one_sentence(aerial, arguments, status, word
     assert "Traceback" not in ended.errors
 
 
-def test_a_peer_that_is_asked_for_but_absent_is_one_sentence(aerial, monkeypatch, tmp_path):
+@pytest.mark.parametrize(("what", "peer"), [("planner", "crocoddyl"), ("controller", "tsid")])
+def test_a_peer_that_is_asked_for_but_absent_is_one_sentence(aerial, monkeypatch, tmp_path, what, peer):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    ended = aerial("bench", "planner", "--sections", "crocoddyl")
+    ended = aerial("bench", what, "--sections", peer)
     assert ended.status == 1
-    assert "--with-crocoddyl" in ended.errors
+    assert "--with-peers" in ended.errors
     assert ended.errors.count("\n") == 1
 
 

@@ -25,7 +25,7 @@ WITHOUT_ROSDEP_KEY = {
     "pinocchio",
     "rosbags",
 }  # README: from requirements.txt
-IN_ITS_OWN_ENVIRONMENT = {"crocoddyl"}  # a peer, in an environment that `aerial bench planner --with-crocoddyl` makes
+IN_ITS_OWN_ENVIRONMENT = {"crocoddyl", "tsid"}  # peers, in environments that `aerial bench … --with-peers` makes
 
 ONLY_IF_INSTALLED = {"proxsuite", "quadprog"}  # peers of `aerial bench controller`
 

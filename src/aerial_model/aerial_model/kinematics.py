@@ -91,7 +91,7 @@ class Kinematics:
             data.dJ,
         )
         self._contacts = [data.oMf[frame].translation for frame in robot.contact_frames]
-        self._moving = np.zeros((len(self._contacts), model.nv), dtype=bool)  # which velocities move which contact point
+        self._moving = np.zeros((len(self._contacts), model.nv), dtype=bool)  # which points which velocities move
         for i, frame in enumerate(robot.contact_frames):
             for joint in list(model.supports[model.frames[frame].parentJoint])[1:]:  # 0: the universe
                 first = model.joints[joint].idx_v

@@ -100,6 +100,19 @@ _TABLES = {
             "forces differ by": lambda row: f"{row['greatest_difference_n']:.2f} N",
         },
     ),
+    "tsid": _Table(
+        "TSID on the same ticks with every point on the ground: CPU time",
+        {
+            "motion": _motion,
+            "solver here": lambda row: row["qp_solver"],
+            "ticks": lambda row: str(row["ticks"]),
+            "whole tick": _micros("tick_us", "p50"),
+            "after the estimate": _micros("after_estimate_us", "p50"),
+            "TSID": _micros("peer_us", "p50"),
+            "TSID, 99 %": _micros("peer_us", "p99"),
+            "TSID over ours": lambda row: f"{row['speed_ratio']:.2f}",
+        },
+    ),
     "variants": _Table(
         "Variants (thesis, table 4.1): request to plan; peaks by exact inverse dynamics",
         {

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
+from aerial_evaluation.bench.crocoddyl_peer import crocoddyl
 from aerial_evaluation.bench.goals import goals
 from aerial_evaluation.bench.literal import literal
 from aerial_evaluation.bench.memory import memory
-from aerial_evaluation.bench.peer import crocoddyl
 from aerial_evaluation.bench.profiles import profiles
 from aerial_evaluation.bench.reach import reach
 from aerial_evaluation.bench.samples import Row

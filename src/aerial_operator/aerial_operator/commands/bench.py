@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from aerial_evaluation.bench import controller, planner
+from aerial_evaluation.bench import controller, crocoddyl_peer, planner, tsid_peer
+from aerial_evaluation.bench.environment import Environment
 from aerial_evaluation.bench.machine import machine
-from aerial_evaluation.bench.peer import Environment
 from aerial_evaluation.bench.planner import measured
 from aerial_evaluation.bench.subject import Subject, motions_of
 from aerial_model.config import closest
@@ -21,6 +21,7 @@ from aerial_planner.compiled import default_cache
 from aerial_planner.kino_dynamic import Variant
 
 SECTIONS = {"planner": planner.SECTIONS, "controller": controller.SECTIONS}
+PEERS = {peer.name: peer for peer in (crocoddyl_peer.PEER, tsid_peer.PEER)}  # by the section that compares with it
 REPEATS = 10
 GOALS = 50
 SECONDS = 60.0  # [s]
@@ -33,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--sections",
         metavar="NAME[,…]",
         type=_names,
-        help="of the benchmark (default: all, crocoddyl where it is installed): "
+        help="of the benchmark (default: all, of peers those that are installed): "
         + "; ".join(f"{what}: {', '.join(sections)}" for what, sections in SECTIONS.items()),
     )
     parser.add_argument(
@@ -52,7 +53,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="for the planner: leave out what `aerial compile` does; else it is done first",
     )
     parser.add_argument(
-        "--with-crocoddyl", action="store_true", help="install crocoddyl for itself, if it is not there"
+        "--with-peers",
+        action="store_true",
+        help=f"install {' or '.join(PEERS)}, whichever is asked for, in an environment of its own, if it is not there",
     )
     parser.add_argument(
         "--seconds", metavar="N", type=float, default=SECONDS, help=f"that the loop runs for (default: {SECONDS:.0f})"
@@ -119,16 +122,17 @@ def _sections(args: argparse.Namespace) -> list[str]:
     for name in args.sections or ():
         if name not in known:
             raise UsageError(f"no section '{name}'{closest(name, known)}; there are {', '.join(known)}")
-    environment = Environment()
-    if args.with_crocoddyl and not environment.is_made:
-        say(f"installing crocoddyl in {environment.folder}")
-        environment.make()
     sections = list(args.sections or known)
-    if "crocoddyl" in sections and not environment.is_made:
-        if args.sections:
-            raise ConfigurationError(environment.missing)
-        say(f"left out: {environment.missing}")
-        sections.remove("crocoddyl")
+    for name in [name for name in sections if name in PEERS]:
+        environment = Environment(PEERS[name])
+        if args.with_peers and not environment.is_made:
+            say(f"installing {name} in {environment.folder}")
+            environment.make()
+        if not environment.is_made:
+            if args.sections:
+                raise ConfigurationError(environment.missing)
+            say(f"left out: {environment.missing}")
+            sections.remove(name)
     return sections
 
 

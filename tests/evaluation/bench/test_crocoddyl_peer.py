@@ -1,4 +1,4 @@
-"""The peer's environment, and the problem it is given; crocoddyl itself is not needed."""
+"""Environments of peers, and the problem crocoddyl is given; crocoddyl itself is not needed."""
 
 import json
 import os
@@ -7,7 +7,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from aerial_evaluation.bench.peer import REQUIREMENTS, Environment, PeerError, crocoddyl, problem
+from aerial_evaluation.bench.crocoddyl_peer import PEER, crocoddyl, problem
+from aerial_evaluation.bench.environment import Environment, PeerError
 from aerial_evaluation.bench.subject import Subject, usual_request
 from aerial_model.robot import JOINT_POSITION, Robot
 from aerial_planner.planner import Planner
@@ -37,15 +38,15 @@ def elsewhere(monkeypatch, tmp_path):
 def made(folder, *, python=None):
     """An environment that says it is made; what it runs is a script of one line."""
     (folder / "bin").mkdir(parents=True)
-    (folder / "made-from").write_text("\n".join(REQUIREMENTS))
+    (folder / "made-from").write_text("\n".join(PEER.requirements))
     if python is not None:
         (folder / "bin" / "python").write_text(f"#!/bin/sh\n{python}\n")
         os.chmod(folder / "bin" / "python", 0o755)
-    return Environment(folder)
+    return Environment(PEER, folder)
 
 
 def test_without_crocoddyl_it_says_what_makes_it(robot, elsewhere):
-    with pytest.raises(PeerError, match=r"crocoddyl==3.2.1 is not in .*--with-crocoddyl") as missing:
+    with pytest.raises(PeerError, match=r"crocoddyl is not in .*--with-peers") as missing:
         crocoddyl(Subject(robot=robot, motions=("jump",)))
     assert str(elsewhere) in str(missing.value)
 
@@ -74,7 +75,7 @@ def test_an_environment_without_python_is_one_sentence(tmp_path):
 def test_an_environment_that_cannot_be_made_is_one_sentence(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(PeerError, match="cannot be made"):
-        Environment(tmp_path / "file" / "folder").make()
+        Environment(PEER, tmp_path / "file" / "folder").make()
 
 
 def test_the_problem_is_the_plans(plan, planner, robot):
@@ -98,9 +99,9 @@ def test_the_peer_finds_the_same_robot_in_the_problem(plan, planner, robot):
     assert np.all(q_j[0] < high)
 
 
-@pytest.mark.skipif(not Environment().is_made, reason="crocoddyl is not installed")
+@pytest.mark.skipif(not Environment(PEER).is_made, reason="crocoddyl is not installed")
 def test_the_peer_solves_the_problem(plan, planner, robot):
-    (run,) = Environment().solve(problem(plan, robot, planner.settings, repeats=1))["runs"]
+    (run,) = Environment(PEER).solve(problem(plan, robot, planner.settings, repeats=1))["runs"]
     assert run["converged"]
     assert run["landing_error_m"] < 0.01
     assert run["peak_torque_ratio"] < 1.0

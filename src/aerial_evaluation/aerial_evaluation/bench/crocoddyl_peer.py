@@ -7,97 +7,36 @@ dependencies are free software (BSD and the like); nothing of them is part of th
 from __future__ import annotations
 
 import dataclasses
-import json
-import os
-import subprocess
-import sys
-import venv
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from aerial_evaluation.bench.environment import Environment, Peer
 from aerial_evaluation.bench.samples import Row, measure, percentiles, summary
 from aerial_evaluation.bench.scaling import KNOTS
 from aerial_evaluation.bench.subject import Subject, usual_request, usual_schedule
-from aerial_model.errors import AerialError
 from aerial_model.plan import Plan
 from aerial_model.robot import Robot
-from aerial_planner.compiled import default_cache
 from aerial_planner.planner import Planner
 from aerial_planner.schedule import load_motion
 from aerial_planner.settings import PlannerSettings
 
-REQUIREMENTS = (
-    # crocoddyl 3.2.1 crashes with pin 4.1.0
-    *("crocoddyl==3.2.1", "libcrocoddyl==3.2.1", "pin==4.0.0", "libpinocchio==4.0.0", "numpy==2.4.6"),
-    *("eigenpy==3.13.0", "coal==3.0.3", "libcoal==3.0.3", "example-robot-data==5.0.0"),
-    *("example-robot-data-loaders==5.0.0", "jrl-cmakemodules==2.1.0", "cmeel==0.62.0", "cmeel-assimp==6.0.5"),
-    *("cmeel-boost==1.90.0", "cmeel-console-bridge==1.0.2.3", "cmeel-octomap==1.10.0", "cmeel-qhull==8.0.2.1"),
-    *("cmeel-tinyxml2==11.0.0", "cmeel-urdfdom==6.0.0", "cmeel-zlib==1.3.2"),
+PEER = Peer(
+    "crocoddyl",
+    Path(__file__).with_name("crocoddyl_jump.py"),
+    (
+        # crocoddyl 3.2.1 crashes with pin 4.1.0
+        *("crocoddyl==3.2.1", "libcrocoddyl==3.2.1", "pin==4.0.0", "libpinocchio==4.0.0", "numpy==2.4.6"),
+        *("eigenpy==3.13.0", "coal==3.0.3", "libcoal==3.0.3", "example-robot-data==5.0.0"),
+        *("example-robot-data-loaders==5.0.0", "jrl-cmakemodules==2.1.0", "cmeel==0.62.0", "cmeel-assimp==6.0.5"),
+        *("cmeel-boost==1.90.0", "cmeel-console-bridge==1.0.2.3", "cmeel-octomap==1.10.0", "cmeel-qhull==8.0.2.1"),
+        *("cmeel-tinyxml2==11.0.0", "cmeel-urdfdom==6.0.0", "cmeel-zlib==1.3.2"),
+    ),
 )
-_SCRIPT = Path(__file__).with_name("crocoddyl_jump.py")
 _TOLERANCE = 1e-4  # at which FDDP stops, as the planner's solver does
 _MAX_ITERATIONS = 100
 _WORTH = ("landing_error_m", "landing_tilt_deg", "peak_torque_ratio", "peak_voltage_ratio", "friction_excess")
-
-
-class PeerError(AerialError):
-    """The peer's environment is missing, or what runs in it failed."""
-
-
-class Environment:
-    """A virtual environment with crocoddyl.
-
-    Args:
-        folder: where it is, or is to be.
-    """
-
-    def __init__(self, folder: Path | None = None) -> None:
-        self.folder = default_cache() / "crocoddyl" if folder is None else folder
-        self._stamp = self.folder / "made-from"
-
-    @property
-    def is_made(self) -> bool:
-        """It holds what ``REQUIREMENTS`` says."""
-        return self._stamp.is_file() and self._stamp.read_text(encoding="utf-8").split() == list(REQUIREMENTS)
-
-    @property
-    def missing(self) -> str:
-        """What to do when it is not made."""
-        return (
-            f"{REQUIREMENTS[0]} is not in {self.folder}, where it needs an environment with another Pinocchio: "
-            "`./aerial bench planner --with-crocoddyl` makes it, once (1 GB)"
-        )
-
-    def make(self) -> None:
-        """Make it anew.
-
-        Raises:
-            PeerError: with the end of pip's output.
-        """
-        try:
-            venv.create(self.folder, clear=True, with_pip=False)
-        except OSError as error:
-            raise PeerError(f"{self.folder}: cannot be made ({error.strerror})") from None
-        install = ("-m", "pip", "--python", str(self._python), "install", "--no-input", "--quiet", *REQUIREMENTS)
-        _run([sys.executable, *install], "")
-        self._stamp.write_text("\n".join(REQUIREMENTS), encoding="utf-8")
-
-    def solve(self, problem: dict[str, Any]) -> dict[str, Any]:
-        """Return what the script says about a problem.
-
-        Raises:
-            PeerError: if the environment is missing, or the script fails.
-        """
-        if not self.is_made:
-            raise PeerError(self.missing)
-        return json.loads(_run([str(self._python), "-I", str(_SCRIPT)], json.dumps(problem)))
-
-    @property
-    def _python(self) -> Path:
-        return self.folder / "bin" / "python"
 
 
 def crocoddyl(subject: Subject) -> list[Row]:
@@ -109,7 +48,7 @@ def crocoddyl(subject: Subject) -> list[Row]:
         PeerError: if there is no crocoddyl.
     """
     rows = []
-    environment = Environment()
+    environment = Environment(PEER)
     for motion in subject.motions:
         if load_motion(motion, subject.robot).rotation is not None:
             continue
@@ -190,21 +129,3 @@ def problem(plan: Plan, robot: Robot, settings: PlannerSettings, repeats: int) -
 def _in_take_off(plan: Plan) -> np.ndarray:
     """Return which knots ``(K,)`` have contacts."""
     return plan.contact.any(axis=1)
-
-
-def _run(command: Sequence[str], text: str) -> str:
-    """Return what a command prints.
-
-    Raises:
-        PeerError: with the end of what it says when it fails.
-    """
-    ours = {"PYTHONPATH", "LD_LIBRARY_PATH"}  # another Pinocchio's, here
-    environment = {name: value for name, value in os.environ.items() if name not in ours} | {"OMP_NUM_THREADS": "1"}
-    try:
-        outcome = subprocess.run(command, input=text, capture_output=True, text=True, env=environment, check=False)
-    except OSError as error:
-        raise PeerError(f"{command[0]}: cannot be run ({error.strerror})") from None
-    if outcome.returncode != 0:
-        said = " ".join((outcome.stderr or outcome.stdout).split())[-300:]
-        raise PeerError(f"{Path(command[0]).name} ended with status {outcome.returncode}: {said}")
-    return outcome.stdout
