@@ -8,8 +8,8 @@ import pytest
 
 from aerial_model.robot import JOINT_VELOCITY
 from aerial_model.state import Measurement
-from aerial_wbic.drive import Drive, inverse_dynamics
-from aerial_wbic.qp import ForceOptimization, Solution
+from aerial_wbic.drive import Drive
+from aerial_wbic.qp import ForceOptimization
 from aerial_wbic.target import PostureTarget
 
 ACCELERATION_TOLERANCE = 1e-6  # [m/s²], [rad/s²]
@@ -40,7 +40,7 @@ def test_torque_reproduces_the_acceleration(robot, gains, state_at, contact, see
     optimization = ForceOptimization(robot, gains.weight_base, gains.weight_force)
     f_cmd = random.normal([0, 0, 30.0], 5.0, (4, 3))
     solution = optimization.solve(state, 5 * random.normal(size=len(state.v)), f_cmd, np.array(contact, dtype=bool))
-    torque = np.concatenate([np.zeros(6), inverse_dynamics(state, solution)])
+    torque = np.concatenate([np.zeros(6), solution.torque])
     torque += np.einsum("ikv,ik->v", state.J_contacts, solution.force)
     vdot = pin.aba(robot.model, robot.model.createData(), state.q, state.v, torque)
     np.testing.assert_allclose(vdot, solution.vdot, atol=ACCELERATION_TOLERANCE)
@@ -48,11 +48,11 @@ def test_torque_reproduces_the_acceleration(robot, gains, state_at, contact, see
 
 def test_friction_of_the_reference_velocity_is_fed_forward(robot, gains, drive, state_at):
     state = state_at(0)
-    solution = Solution(vdot=np.zeros(len(state.v)), force=np.zeros((4, 3)), solved=True)
-    v_ref = np.zeros(len(state.v))
-    still = drive.command(state, solution, v_ref, measured(state))
+    torque, v_ref = np.random.default_rng(0).normal(size=robot.n_joints), np.zeros(robot.model.nv)
+    still = drive.command(torque, v_ref, measured(state))
     v_ref[JOINT_VELOCITY] = 10 * gains.stiction_speed
-    moving = drive.command(state, solution, v_ref, measured(state))
+    np.testing.assert_array_equal(still.torque, torque)
+    moving = drive.command(torque, v_ref, measured(state))
     expected = robot.actuators.dry_friction + robot.actuators.damping * 10 * gains.stiction_speed
     np.testing.assert_allclose(moving.torque - still.torque, expected, rtol=1e-6)
     np.testing.assert_array_equal(moving.velocity, v_ref[JOINT_VELOCITY])
@@ -60,27 +60,22 @@ def test_friction_of_the_reference_velocity_is_fed_forward(robot, gains, drive, 
 
 def test_a_command_names_the_measurement_it_answers(drive, state_at):
     state = state_at(moving=False)
-    solution = Solution(vdot=np.zeros(len(state.v)), force=np.zeros((4, 3)), solved=True)
-    command = drive.command(state, solution, np.zeros(len(state.v)), measured(state))
+    command = drive.command(np.zeros(12), np.zeros(18), measured(state))
     assert (command.state_time, command.state_sequence) == (1.5, 7)
 
 
-@pytest.mark.parametrize(("acceleration", "saturated"), [(0.0, 0), (1e5, 1)])
-def test_ticks_beyond_a_limit_are_counted_and_asked_for_all_the_same(drive, state_at, acceleration, saturated):
-    state = state_at(moving=False)
-    vdot = np.zeros(len(state.v))
-    vdot[JOINT_VELOCITY] = acceleration
-    solution = Solution(vdot=vdot, force=np.zeros((4, 3)), solved=True)
-    command = drive.command(state, solution, np.zeros(len(state.v)), measured(state))
-    np.testing.assert_allclose(command.torque, inverse_dynamics(state, solution))
+@pytest.mark.parametrize(("share", "saturated"), [(0.99, 0), (1.01, 1)])
+def test_ticks_beyond_a_limit_are_counted_and_asked_for_all_the_same(robot, drive, state_at, share, saturated):
+    state, torque = state_at(moving=False), share * robot.actuators.torque_max
+    command = drive.command(torque, np.zeros(len(state.v)), measured(state))
+    np.testing.assert_array_equal(command.torque, torque)
     assert drive.saturated_ticks == saturated
 
 
 def test_a_voltage_beyond_the_bus_counts_too(robot, drive, state_at):
     state = state_at(moving=False)
     state.v[JOINT_VELOCITY] = 0.99 * robot.actuators.no_load_speed
-    solution = Solution(vdot=np.zeros(len(state.v)), force=np.zeros((4, 3)), solved=True)
-    drive.command(state, solution, 2 * state.v, measured(state))
+    drive.command(np.zeros(robot.n_joints), 2 * state.v, measured(state))
     assert drive.saturated_ticks == 1
 
 
@@ -90,7 +85,9 @@ def test_torques_at_the_end_of_their_room_ask_for_the_share_of_the_limits(robot,
     measurement, law = measured(state), robot.actuators
     along = gains.joint_damping * (v_ref - state.v)[JOINT_VELOCITY]
     along += law.friction(v_ref[JOINT_VELOCITY], gains.stiction_speed)
-    for torque in drive.room(v_ref, measurement):
+    for torque, beyond in zip(drive.room(v_ref, measurement), (-0.01, 0.01), strict=True):
+        assert not drive.exceeds(torque - beyond, v_ref, measurement)
+        assert drive.exceeds(torque + beyond, v_ref, measurement)
         requested = torque + along
         use = np.maximum(law.torque_ratio(requested), law.voltage_ratio(requested, measurement.joint_velocity))
         np.testing.assert_allclose(use, gains.actuator_share)
@@ -113,7 +110,7 @@ def test_a_posture_is_left_to_the_boards(gains, drive, robot, state_at):
 
 def test_a_command_is_always_finite(gains, drive, state_at):
     state = state_at(moving=False)
-    solution = Solution(vdot=np.full(len(state.v), np.nan), force=np.zeros((4, 3)), solved=False)
-    command = drive.command(state, solution, np.zeros(len(state.v)), measured(state))
+    torque = np.array([np.nan, *np.ones(11)])
+    command = drive.command(torque, np.zeros(len(state.v)), measured(state))
     assert not command.torque.any()
     assert np.all(command.damping == gains.stop_damping)

@@ -12,7 +12,7 @@ from scipy.optimize import nnls
 from aerial_model.contact import friction_pyramid
 from aerial_model.robot import BASE_TWIST
 from aerial_wbic.gains import QpSolver
-from aerial_wbic.qp import ForceOptimization, Room, Solution, inverse_dynamics
+from aerial_wbic.qp import ForceOptimization, Room, Solution
 from aerial_wbic.qp_solvers import SOLVERS
 from aerial_wbic.target import shared_load
 
@@ -190,10 +190,10 @@ def test_torques_stay_in_their_room(optimization, robot, state_at, seed, contact
     state = state_at(seed)
     wish = *landing(state), contact
     plain = optimization.solve(state, *wish)
-    without = inverse_dynamics(state, optimization.solve(state, wish[0], 0 * wish[1], np.zeros(4, dtype=bool)))
+    without = optimization.solve(state, wish[0], 0 * wish[1], np.zeros(4, dtype=bool)).torque
     room = room_of(state, 12.0)
     limited = optimization.within(room, plain, state, *wish)
-    torque, bearing = inverse_dynamics(state, limited), np.repeat(contact, 3)
+    torque, bearing = limited.torque, np.repeat(contact, 3)
     assert np.all(torque[bearing] < np.maximum(room.greatest, without)[bearing] + ROOM_TOLERANCE)
     assert np.all(torque[bearing] > np.minimum(room.least, without)[bearing] - ROOM_TOLERANCE)
     assert (limited.force @ friction_pyramid(robot.friction_coefficient).T).min() > -ROOM_TOLERANCE
@@ -204,9 +204,9 @@ def test_with_too_little_room_the_robot_brakes_as_hard_as_it_can(optimization, s
     state = state_at(moving=False)
     contact = np.ones(4, dtype=bool)
     plain = optimization.solve(state, *landing(state), contact)
-    assert np.abs(inverse_dynamics(state, plain)).max() > 15.0
+    assert np.abs(plain.torque).max() > 15.0
     limited = optimization.within(room_of(state, 15.0), plain, state, *landing(state), contact)
-    assert np.abs(inverse_dynamics(state, limited)).max() == pytest.approx(15.0, abs=ROOM_TOLERANCE)
+    assert np.abs(limited.torque).max() == pytest.approx(15.0, abs=ROOM_TOLERANCE)
     assert limited.force[:, 2].sum() < plain.force[:, 2].sum()
 
 
@@ -214,4 +214,12 @@ def test_with_enough_room_nothing_changes(optimization, state_at):
     state = state_at(moving=False)
     contact = np.ones(4, dtype=bool)
     plain = optimization.solve(state, *landing(state), contact)
-    assert optimization.within(room_of(state, 50.0), plain, state, *landing(state), contact) is plain
+    limited = optimization.within(room_of(state, 50.0), plain, state, *landing(state), contact)
+    np.testing.assert_allclose(limited.force, plain.force, atol=FORCE_TOLERANCE)
+
+
+def test_in_flight_no_limit_can_be_kept(optimization, state_at):
+    state = state_at(moving=False)
+    none = np.zeros(4, dtype=bool)
+    plain = optimization.solve(state, *landing(state), none)
+    assert optimization.within(room_of(state, 0.0), plain, state, *landing(state), none) is plain

@@ -18,7 +18,8 @@ from aerial_model.robot import BASE_ANGULAR, BASE_LINEAR, BASE_ORIENTATION, BASE
 class Configuration(NamedTuple):
     """Quantities of a robot at one state, in W with Pinocchio's v (base twist in B, linear first).
 
-    A tuple of arrays of its own, so that compiled code takes it as it is.
+    A tuple of arrays, so that compiled code takes it as it is and writes into it: to return arrays to Python takes it a
+    microsecond each.
     """
 
     q: np.ndarray  # (nq,)
@@ -54,8 +55,8 @@ class Configuration(NamedTuple):
         return self.J_contacts @ self.v
 
 
-class _Workspace(NamedTuple):
-    """Pinocchio's own memory, which compiled code reads from: to look it up anew takes longer than to copy it."""
+class Workspace(NamedTuple):
+    """What a configuration is read from: mostly Pinocchio's own memory, because to look it up anew takes longer."""
 
     R_WB: np.ndarray  # (3, 3)
     M: np.ndarray  # upper triangle (nv, nv)
@@ -68,6 +69,8 @@ class _Workspace(NamedTuple):
     angular_momentum: np.ndarray  # (3,)
     J: np.ndarray  # of every joint's spatial velocity at W's origin, linear rows first (6, nv)
     Jdot: np.ndarray  # the same
+    contacts: np.ndarray  # centres of the contact spheres (n_c, 3)
+    moving: np.ndarray  # which points which velocities move (n_c, nv) bool
 
 
 class Kinematics:
@@ -77,7 +80,13 @@ class Kinematics:
         self.robot = robot
         model = robot.model
         self._data = data = model.createData()
-        self._workspace = _Workspace(
+        self._contacts = [data.oMf[frame].translation for frame in robot.contact_frames]
+        moving = np.zeros((len(self._contacts), model.nv), dtype=bool)
+        for i, frame in enumerate(robot.contact_frames):
+            for joint in list(model.supports[model.frames[frame].parentJoint])[1:]:  # 0: the universe
+                first = model.joints[joint].idx_v
+                moving[i, first : first + model.joints[joint].nv] = True
+        self._workspace = Workspace(
             data.oMi[1].rotation,
             data.M,
             data.Minv,
@@ -89,42 +98,78 @@ class Kinematics:
             data.hg.angular,
             data.J,
             data.dJ,
+            np.array(self._contacts),
+            moving,
         )
-        self._contacts = [data.oMf[frame].translation for frame in robot.contact_frames]
-        self._moving = np.zeros((len(self._contacts), model.nv), dtype=bool)  # which points which velocities move
-        for i, frame in enumerate(robot.contact_frames):
-            for joint in list(model.supports[model.frames[frame].parentJoint])[1:]:  # 0: the universe
-                first = model.joints[joint].idx_v
-                self._moving[i, first : first + model.joints[joint].nv] = True
 
     def at(self, q: np.ndarray, v: np.ndarray) -> Configuration:
-        """Return the robot at ``q`` ``(nq,)`` with velocity ``v`` ``(nv,)``."""
+        """Return the robot at ``q`` ``(nq,)`` with velocity ``v`` ``(nv,)``, both copied."""
+        state = self.blank()
+        state.q[:] = q
+        state.v[:] = v
+        fill(state, self.computed(state.q, state.v))
+        return state
+
+    def blank(self) -> Configuration:
+        """Return the memory of a configuration."""
+        nq, nv, n_c = self.robot.model.nq, self.robot.model.nv, self.robot.n_contacts
+        shapes = {
+            "q": nq,
+            "v": nv,
+            "R_WB": (3, 3),
+            "M": (nv, nv),
+            "M_inv": (nv, nv),
+            "nle": nv,
+            "com": 3,
+            "com_velocity": 3,
+            "A_G": (6, nv),
+            "Adot_v_G": 6,
+            "angular_momentum": 3,
+            "contact_positions": (n_c, 3),
+            "J_contacts": (n_c, 3, nv),
+            "Jdot_v_contacts": (n_c, 3),
+            "omega_contacts": (n_c, 3),
+        }
+        return Configuration(mass=self.robot.mass, **{name: np.zeros(shape) for name, shape in shapes.items()})
+
+    def computed(self, q: np.ndarray, v: np.ndarray) -> Workspace:
+        """Return what ``fill`` needs to know about a robot at ``q`` and ``v``; the next call overwrites it."""
         model, data = self.robot.model, self._data
         pin.computeMinverse(model, data, q)
         pin.crba(model, data, q)
         pin.nonLinearEffects(model, data, q, v)
         pin.dccrba(model, data, q, v)
         pin.updateFramePlacements(model, data)
-        return _configuration(q, v, self.robot.mass, self._workspace, np.array(self._contacts), self._moving)
+        for i, centre in enumerate(self._contacts):
+            self._workspace.contacts[i] = centre
+        return self._workspace
 
 
 @compiled
-def _configuration(
-    q: np.ndarray, v: np.ndarray, mass: float, workspace: _Workspace, contacts: np.ndarray, moving: np.ndarray
-) -> Configuration:
+def fill(state: Configuration, workspace: Workspace) -> None:
+    """Write into a configuration all that follows from its q and v, for which the workspace was computed."""
+    contacts, moving, v = workspace.contacts, workspace.moving, state.v
     nv, n_c = len(v), len(contacts)
-    M, M_inv = np.empty((nv, nv)), np.empty((nv, nv))
-    A_G, Adot_v_G = np.empty((6, nv)), np.zeros(6)
     for i in range(nv):
         for j in range(i, nv):
-            M[i, j] = M[j, i] = workspace.M[i, j]
-            M_inv[i, j] = M_inv[j, i] = workspace.M_inv[i, j]
+            state.M[i, j] = state.M[j, i] = workspace.M[i, j]
+            state.M_inv[i, j] = state.M_inv[j, i] = workspace.M_inv[i, j]
+    state.R_WB[:] = workspace.R_WB
+    state.nle[:] = workspace.nle
+    state.com[:] = workspace.com
+    state.com_velocity[:] = workspace.com_velocity
+    state.angular_momentum[:] = workspace.angular_momentum
+    state.contact_positions[:] = contacts
     for row in range(6):
         other = (row + 3) % 6  # Pinocchio has linear rows first
+        state.Adot_v_G[row] = 0.0
         for k in range(nv):
-            A_G[row, k] = workspace.A_G[other, k]
-            Adot_v_G[row] += workspace.Adot_G[other, k] * v[k]
-    J, bias, omega = np.zeros((n_c, 3, nv)), np.zeros((n_c, 3)), np.zeros((n_c, 3))
+            state.A_G[row, k] = workspace.A_G[other, k]
+            state.Adot_v_G[row] += workspace.Adot_G[other, k] * v[k]
+    J, bias, omega = state.J_contacts, state.Jdot_v_contacts, state.omega_contacts
+    J[:] = 0.0
+    bias[:] = 0.0
+    omega[:] = 0.0
     turn, turn_rate, velocity = np.empty(3), np.empty(3), np.empty(3)
     for i in range(n_c):
         c = contacts[i]
@@ -148,24 +193,6 @@ def _configuration(
         bias[i, 0] += turn_rate[1] * c[2] - turn_rate[2] * c[1] + w[1] * velocity[2] - w[2] * velocity[1]
         bias[i, 1] += turn_rate[2] * c[0] - turn_rate[0] * c[2] + w[2] * velocity[0] - w[0] * velocity[2]
         bias[i, 2] += turn_rate[0] * c[1] - turn_rate[1] * c[0] + w[0] * velocity[1] - w[1] * velocity[0]
-    return Configuration(
-        q,
-        v,
-        mass,
-        workspace.R_WB.copy(),
-        M,
-        M_inv,
-        workspace.nle.copy(),
-        workspace.com.copy(),
-        workspace.com_velocity.copy(),
-        A_G,
-        Adot_v_G,
-        workspace.angular_momentum.copy(),
-        contacts,
-        J,
-        bias,
-        omega,
-    )
 
 
 @compiled

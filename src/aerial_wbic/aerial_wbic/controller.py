@@ -24,7 +24,7 @@ from aerial_wbic.drive import Drive
 from aerial_wbic.estimator import Estimator
 from aerial_wbic.gains import ControllerGains, Touchdown
 from aerial_wbic.phase import FOLLOWING, Phase, Phases
-from aerial_wbic.qp import ForceOptimization, Room
+from aerial_wbic.qp import ForceOptimization
 from aerial_wbic.qp_solvers import SOLVERS
 from aerial_wbic.target import GRAVITY, Fold, PostureTarget, WholeBodyTarget
 from aerial_wbic.tasks import Arrangement, Limbs, attitude_error, command
@@ -97,11 +97,12 @@ class Controller:
         if not isinstance(target, WholeBodyTarget):
             return self._drive.resting(target, measurement)
         vdot_cmd, v_ref = self._accelerations(state, target)
-        room = self._drive.room(v_ref, measurement)
-        solution = self._qp.solve(state, vdot_cmd, target.force, target.contact)
+        wish = state, vdot_cmd, target.force, target.contact
+        solution = self._qp.solve(*wish)
         self._fallback_ticks += not solution.solved
-        solution = self._qp.within(room, solution, state, vdot_cmd, target.force, target.contact)
-        return self._drive.command(state, solution, v_ref, measurement)
+        if self._drive.exceeds(solution.torque, v_ref, measurement):
+            solution = self._qp.within(self._drive.room(v_ref, measurement), solution, *wish)
+        return self._drive.command(solution.torque, v_ref, measurement)
 
     def accept(self, plan: Plan) -> None:
         """Begin ``plan``, given in the start heading frame, with the next measurement.
@@ -205,7 +206,7 @@ class Controller:
             self.step(measurement)
         state, target = self._now
         wish = state, np.zeros(self.robot.model.nv), target.force, target.contact
-        self._qp.within(Room(joints, joints), self._qp.solve(*wish), *wish)
+        self._qp.within(self._drive.room(state.v, measurement), self._qp.solve(*wish), *wish)
         attitude_error(target.body.orientation, state.base_orientation)
         for time in (0.0, 0.002):
             self._sense.update(time, state, joints)

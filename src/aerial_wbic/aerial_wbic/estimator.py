@@ -32,8 +32,16 @@ from aerial_model.compiled import (
     quaternion,
     vector,
 )
-from aerial_model.kinematics import Configuration, Kinematics, carry
-from aerial_model.robot import BASE_ANGULAR, BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY, Robot
+from aerial_model.kinematics import Configuration, Kinematics, Workspace, carry, fill
+from aerial_model.robot import (
+    BASE_ANGULAR,
+    BASE_LINEAR,
+    BASE_ORIENTATION,
+    BASE_POSITION,
+    JOINT_POSITION,
+    JOINT_VELOCITY,
+    Robot,
+)
 from aerial_model.state import Estimate, Measurement
 from aerial_wbic.gains import EstimatorNoise
 from aerial_wbic.target import GRAVITY
@@ -63,9 +71,9 @@ class Estimator:
 
     def __init__(self, robot: Robot, noise: EstimatorNoise) -> None:
         self.kinematics = Kinematics(robot)
-        self.state: Configuration | None = None  # the robot at the estimate; None before the first
+        self.state: Configuration | None = None  # the robot at the estimate, until the next; None before the first
+        self._memory = self.kinematics.blank()  # of state
         self._noise = noise
-        self._nq, self._nv = robot.model.nq, robot.model.nv
         self._radius = np.array([point.radius for point in robot.contact_points])  # (n_c,) [m]
         self.reset()
 
@@ -81,49 +89,47 @@ class Estimator:
             measurement: of the robot.
             contact: points the schedule has on the ground ``(n_c,)`` bool.
         """
-        if self._time is None:
+        first = self._time is None
+        if first:
+            self._time, self._gyro = measurement.time, measurement.angular_velocity
             self._belief = _nothing(measurement.orientation, len(self._radius))
-        else:
-            _predict(
-                self._belief,
-                measurement.time - self._time,
-                self._gyro,
-                measurement.angular_velocity,
-                measurement.linear_acceleration,
-                measurement.orientation,
-                self._noise,
-            )
-        self.state = self._seen(measurement)
-        if self._time is None:
-            self._begin(measurement)
-        self._time = measurement.time
-        self._gyro = measurement.angular_velocity
+        state = self._memory
+        _predict(
+            self._belief,
+            state.q,
+            state.v,
+            measurement.time - self._time,
+            self._gyro,
+            measurement.angular_velocity,
+            measurement.linear_acceleration,
+            measurement.orientation,
+            measurement.joint_position,
+            measurement.joint_velocity,
+            self._noise,
+        )
+        workspace = self.kinematics.computed(state.q, state.v)
+        if first:
+            self._begin(workspace.contacts, measurement.localization)
+        self._time, self._gyro = measurement.time, measurement.angular_velocity
         if measurement.localization is not None:
             _correct_position(self._belief, measurement.localization, self._noise)
-        _correct(self._belief, self.state, self._radius, contact, measurement.time, self._noise)
+        _correct(self._belief, state, workspace, self._radius, contact, measurement.time, self._noise)
+        self.state = state
         return Estimate(
             time=measurement.time,
-            q=self.state.q,
-            v=self.state.v,
+            q=state.q.copy(),
+            v=state.v.copy(),
             position_variance=float(self._belief.P[P, P]),
             velocity_variance=float(self._belief.P[V, V]),
         )
 
-    def _seen(self, measurement: Measurement) -> Configuration:
-        """Return the robot as the sensors and the believed attitude have it, its base at the origin and linearly at rest."""
-        q, v = np.zeros(self._nq), np.zeros(self._nv)
-        q[BASE_ORIENTATION] = self._belief.orientation
-        q[JOINT_POSITION] = measurement.joint_position
-        v[BASE_ANGULAR] = measurement.angular_velocity
-        v[JOINT_VELOCITY] = measurement.joint_velocity
-        return self.kinematics.at(q, v)
-
-    def _begin(self, measurement: Measurement) -> None:
-        belief, offset = self._belief, self.state.contact_positions
+    def _begin(self, offset: np.ndarray, localization: np.ndarray | None) -> None:
+        """Take the contact points, ``offset`` ``(n_c, 3)`` from the base, to rest on level ground."""
+        belief = self._belief
         belief.X[P] = [0.0, 0.0, self._radius.mean()] - offset.mean(axis=0)
         belief.P[P, P] = self._noise.foot_position**2  # the attitude's error moves all offsets alike: no mean over feet
-        if measurement.localization is not None:
-            belief.X[P] = measurement.localization
+        if localization is not None:
+            belief.X[P] = localization
             belief.P[P, P] = self._noise.localization**2
         belief.P[V, V] = self._noise.foot_velocity**2
         for i in range(len(offset)):
@@ -144,14 +150,21 @@ def _nothing(orientation: np.ndarray, n_c: int) -> Belief:
 @compiled
 def _predict(
     belief: Belief,
+    q: np.ndarray,
+    v: np.ndarray,
     dt: float,
     gyro_before: np.ndarray,
     gyro: np.ndarray,
     specific_force: np.ndarray,
     reported: np.ndarray,
+    joint_position: np.ndarray,
+    joint_velocity: np.ndarray,
     noise: EstimatorNoise,
 ) -> None:
-    """Carry the belief on by ``dt`` [s]; ``reported`` is the inertial unit's attitude."""
+    """Carry the belief on by ``dt`` [s]; ``reported`` is the inertial unit's attitude.
+
+    Write into q and v what the sensors and the believed attitude say, the base at the origin and linearly at rest.
+    """
     half_turn = exp_of(vector((gyro_before + gyro) * (dt / 4)))
     midway = product_of(quaternion(belief.orientation), half_turn)
     # The accelerometer reports the mean over the interval: it acts at the attitude half-way.
@@ -172,6 +185,8 @@ def _predict(
     cov[V, V] += push
     for i in range(FEET, len(X)):
         cov[i, i] += noise.foot_drift**2 * dt
+    q[BASE_POSITION], q[BASE_ORIENTATION], q[JOINT_POSITION] = 0.0, belief.orientation, joint_position
+    v[BASE_LINEAR], v[BASE_ANGULAR], v[JOINT_VELOCITY] = 0.0, gyro, joint_velocity
 
 
 @compiled
@@ -183,9 +198,16 @@ def _draw(orientation: np.ndarray, towards: np.ndarray, share: float) -> None:
 
 @compiled
 def _correct(
-    belief: Belief, state: Configuration, radius: np.ndarray, contact: np.ndarray, time: float, noise: EstimatorNoise
+    belief: Belief,
+    state: Configuration,
+    workspace: Workspace,
+    radius: np.ndarray,
+    contact: np.ndarray,
+    time: float,
+    noise: EstimatorNoise,
 ) -> None:
-    """Let the loaded points of a robot seen from its base measure; then move it to where it is believed to be."""
+    """Fill in the robot as seen from its base, let its loaded points measure; then move it to where it is believed to be."""
+    fill(state, workspace)
     _correct_by_legs(belief, state, radius, contact, time, noise)
     carry(state, belief.X[P].copy(), belief.X[V].copy())
 

@@ -25,10 +25,11 @@ _LEVER = 0.2  # [m] by which torques are divided, so that their rows are as larg
 
 
 class Solution(NamedTuple):
-    """Acceleration and forces that obey the equations of motion of the base."""
+    """Acceleration, forces and torques that obey the equations of motion."""
 
     vdot: np.ndarray  # (nv,) base as physics has it, joints as commanded
     force: np.ndarray  # f_r (n_c, 3) in W [N]; zero where no load is planned
+    torque: np.ndarray  # of the joints (n,) [N·m], thesis (2.2)
     solved: bool  # False: the fallback's forces
 
 
@@ -55,6 +56,7 @@ class ForceOptimization:
         self._programs = [_Program(n, 0, pyramid, weight_base, weight_force, solver) for n in numbers]
         self._limited = [_Program(n, robot.n_joints, pyramid, weight_base, weight_force, solver) for n in numbers]
         self._friction = float(pyramid[0, 2])
+        self._root_force = float(np.sqrt(weight_force))
 
     def solve(self, state: Configuration, vdot_cmd: np.ndarray, f_cmd: np.ndarray, contact: np.ndarray) -> Solution:
         """Return the forces and the acceleration of (3.24).
@@ -69,9 +71,7 @@ class ForceOptimization:
         """
         n = np.count_nonzero(contact)
         df = self._programs[n - 1].solve(state, vdot_cmd, f_cmd, contact) if n else _NO_FORCE
-        solved = df is not None
-        force, vdot = _outcome(state, vdot_cmd, f_cmd, contact, df if solved else _NO_FORCE, solved, self._friction)
-        return Solution(vdot, force, solved)
+        return self._solution(state, vdot_cmd, f_cmd, contact, df)
 
     def within(
         self,
@@ -82,18 +82,24 @@ class ForceOptimization:
         f_cmd: np.ndarray,
         contact: np.ndarray,
     ) -> Solution:
-        """Return ``solution`` if the motors have room for its torques, else the solution of (3.24) with limits.
+        """Return the solution of (3.24) with limits, or the given one of ``solve`` when there is none or nothing bears load.
 
         Limits are those of the limbs that bear load; what no force on them could keep is not asked for. The rest as
         for ``solve``.
         """
-        if not contact.any() or not _exceeds(state, solution, room):
+        if not contact.any():
             return solution
         df = self._limited[np.count_nonzero(contact) - 1].solve(state, vdot_cmd, f_cmd, contact, room)
-        if df is None:
-            return solution
-        force, vdot = _outcome(state, vdot_cmd, f_cmd, contact, df, True, self._friction)
-        return Solution(vdot, force, solution.solved)
+        limited = self._solution(state, vdot_cmd, f_cmd, contact, df)
+        return limited._replace(solved=solution.solved) if limited.solved else solution
+
+    def _solution(
+        self, state: Configuration, vdot_cmd: np.ndarray, f_cmd: np.ndarray, contact: np.ndarray, df: np.ndarray | None
+    ) -> Solution:
+        """Return what follows from the optimum; with None, or what is not finite, the fallback."""
+        found = _NO_FORCE if df is None else df
+        outcome = _outcome(state, vdot_cmd, f_cmd, contact, found, df is not None, self._root_force, self._friction)
+        return Solution(*outcome)
 
 
 _NO_FORCE = np.zeros(0)
@@ -134,7 +140,7 @@ class _Program:
         contact: np.ndarray,
         room: Room | None = None,
     ) -> np.ndarray | None:
-        """Return δ_f ``(3 n,)`` [N] of the loaded points, or None; ``room`` for one with limits, the rest as of the whole."""
+        """Return √Q_2 δ_f ``(3 n,)`` of the loaded points, or None; ``room`` for one with limits, the rest as of the whole."""
         root_base, root_force = self._root_base, self._root_force
         A, lower, upper = self._A.data, self._lower, self._upper
         _state_problem(
@@ -142,8 +148,7 @@ class _Program:
         )
         if room is not None:
             _state_limits(state, vdot_cmd, f_cmd, contact, room, root_base, root_force, self._limits, A, lower, upper)
-        x = self._solver.minimum(self._A, lower, upper)
-        return None if x is None else x / root_force
+        return self._solver.minimum(self._A, lower, upper)
 
 
 @compiled
@@ -207,7 +212,7 @@ def _state_limits(
     _solve_base(state, free)
     for i in loaded:
         force[i] = f_cmd[i]
-    torque_cmd = inverse_dynamics(state, Solution(vdot_cmd, force, True))
+    torque_cmd = _inverse_dynamics(state, vdot_cmd, force)
     for j in range(n_joints):
         row = JOINT_VELOCITY.start + j
         without = state.M[row] @ vdot_cmd + state.nle[row]
@@ -228,19 +233,12 @@ def _state_limits(
 
 
 @compiled
-def _exceeds(state: Configuration, solution: Solution, room: Room) -> bool:
-    """Return whether a torque leaves the room."""
-    torque = inverse_dynamics(state, solution)
-    return bool(np.any(torque < room.least) or np.any(torque > room.greatest))
-
-
-@compiled
-def inverse_dynamics(state: Configuration, solution: Solution) -> np.ndarray:
+def _inverse_dynamics(state: Configuration, vdot: np.ndarray, force: np.ndarray) -> np.ndarray:
     """Return the joint torques ``(n,)`` [N·m], the joint rows of H q̈ + C q̇ + G − Σ J_c,iᵀ f_i, thesis (2.2)."""
-    torque = state.M[JOINT_VELOCITY] @ solution.vdot + state.nle[JOINT_VELOCITY]
-    for i in range(len(solution.force)):
+    torque = state.M[JOINT_VELOCITY] @ vdot + state.nle[JOINT_VELOCITY]
+    for i in range(len(force)):
         for k in range(3):
-            torque -= solution.force[i, k] * state.J_contacts[i, k, JOINT_VELOCITY]
+            torque -= force[i, k] * state.J_contacts[i, k, JOINT_VELOCITY]
     return torque
 
 
@@ -252,13 +250,19 @@ def _outcome(
     contact: np.ndarray,
     df: np.ndarray,
     solved: bool,
+    root_force: float,
     friction: float,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return f_r ``(n_c, 3)`` and q̈ ``(nv,)``, the base's part from the forces: the equations of motion hold to rounding."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
+    """Return q̈ ``(nv,)``, f_r ``(n_c, 3)``, τ ``(n,)``, and whether they follow from √Q_2 δ_f, which is ``df``.
+
+    The base's part of q̈ follows from the forces: the equations of motion hold to rounding.
+    """
     force = np.zeros_like(f_cmd)
+    for k in range(len(df)):
+        solved = solved and np.isfinite(df[k])
     for n, i in enumerate(np.flatnonzero(contact)):
         if solved:
-            force[i] = f_cmd[i] + df[3 * n : 3 * n + 3]
+            force[i] = f_cmd[i] + df[3 * n : 3 * n + 3] / root_force
         else:
             normal = max(f_cmd[i, 2], 0.0)
             side = friction * normal
@@ -270,7 +274,7 @@ def _outcome(
     _solve_base(state, change)
     vdot = vdot_cmd.copy()
     vdot[BASE_TWIST] += change[:, 0]
-    return force, vdot
+    return vdot, force, _inverse_dynamics(state, vdot, force), solved
 
 
 @compiled

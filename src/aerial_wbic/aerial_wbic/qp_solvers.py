@@ -43,7 +43,7 @@ class QpMinimizer(Protocol):
     """What solves the problems of one sparsity."""
 
     def minimum(self, A: sparse.csc_matrix, lower: np.ndarray, upper: np.ndarray) -> np.ndarray | None:
-        """Return x ``(3 n,)`` at the optimum; None if none is found."""
+        """Return x ``(3 n,)`` at the optimum, which the caller checks to be finite; None if none is found."""
 
 
 QpFactory = Callable[[sparse.csc_matrix, np.ndarray, np.ndarray], QpMinimizer]  # of a first problem of the sparsity
@@ -80,10 +80,7 @@ class Osqp:
     def _attempt(self) -> np.ndarray | None:
         """Return the variables that OSQP finds; None if it gives up."""
         self._core.solve()
-        if self._core.info.status_val not in _ACCEPTED:
-            return None
-        x = self._core.solution.x
-        return x if np.isfinite(x).all() else None
+        return self._core.solution.x if self._core.info.status_val in _ACCEPTED else None
 
 
 class Daqp:
@@ -98,7 +95,7 @@ class Daqp:
         if not np.isfinite(problem.f).all():  # it would not end
             return None
         x, _, status, _ = daqp.solve(*problem, self._sense)
-        return x if status == _DAQP_SOLVED and np.isfinite(x).all() else None
+        return x if status == _DAQP_SOLVED else None
 
 
 class Reduced(NamedTuple):

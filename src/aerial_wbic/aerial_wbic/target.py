@@ -132,8 +132,8 @@ class Hold:
             offset=settling(offset, velocity, self._rest, rates),
             tilt=settling(tilt, spin, np.zeros(3), max(rate, REACH * float(np.linalg.norm(spin)) / turn)),
             level=level,
-            gains=gains,
         )
+        self._target = _resting(len(state.v) - JOINT_VELOCITY.start, len(state.contact_positions), gains)
         self.end = time + TIME / rate
 
     def reached(self, state: Configuration) -> bool:
@@ -141,8 +141,9 @@ class Hold:
         return bool(np.linalg.norm(state.com - support_centre(state) - self._rest) < REST_TOLERANCE * self._rest[2])
 
     def at(self, time: float, state: Configuration) -> WholeBodyTarget:
-        """Return the target at ``time`` [s] of a robot at ``state``."""
-        return _held(self._course, time, state)
+        """Return the target at ``time`` [s] of a robot at ``state``; it holds until the next."""
+        _held(self._course, time, state, self._target)
+        return self._target
 
 
 class _Course(NamedTuple):
@@ -152,44 +153,37 @@ class _Course(NamedTuple):
     offset: Settling  # [m]
     tilt: Settling  # rotation vector in W [rad]
     level: np.ndarray  # (4,)
-    gains: BodyGains
+
+
+def _resting(n: int, n_c: int, gains: BodyGains) -> WholeBodyTarget:
+    """Return the memory of a target with every contact point on the ground and n joints that do not move."""
+    body = BodyTarget(*(np.zeros(size) for size in (3, 3, 3, 4, 3, 3)), gains)
+    joints = [np.zeros(n) for _ in range(3)]
+    return WholeBodyTarget(body, *joints, np.zeros(3), np.zeros(3), np.zeros((n_c, 3)), np.ones(n_c, dtype=bool))
 
 
 @compiled
-def _held(course: _Course, time: float, state: Configuration) -> WholeBodyTarget:
-    offset, velocity, acceleration = settled(course.offset, time - course.begin)
-    com = support_centre(state) + offset
+def _held(course: _Course, time: float, state: Configuration, target: WholeBodyTarget) -> None:
+    body = target.body
+    position, attitude = body.gains
+    offset, body.com_velocity[:], acceleration = settled(course.offset, time - course.begin)
+    body.com[:] = support_centre(state) + offset
     # The base task adds its feedback to this acceleration; the sum is what the support can give.
-    position = course.gains.position
-    feedback = position.stiffness * (com - state.com) + position.damping * (velocity - state.com_velocity)
+    feedback = position.stiffness * (body.com - state.com) + position.damping * (body.com_velocity - state.com_velocity)
     total = supported(state, acceleration + feedback)
-    tilt, angular_velocity, angular_acceleration = settled(course.tilt, time - course.begin)
-    body = BodyTarget(
-        com,
-        velocity,
-        total - feedback,
-        np.array(product_of(exp_of(vector(tilt)), quaternion(course.level))),
-        angular_velocity,
-        angular_acceleration,
-        course.gains,
-    )
-    n = len(state.v) - JOINT_VELOCITY.start
+    body.com_acceleration[:] = total - feedback
+    tilt, body.angular_velocity[:], body.angular_acceleration[:] = settled(course.tilt, time - course.begin)
+    orientation = product_of(exp_of(vector(tilt)), quaternion(course.level))
+    body.orientation[:] = orientation
     # The robot turns as one: of the angular momentum only that of joints moving beside the base is to go away.
     inertia = np.ascontiguousarray(state.A_G[:3, BASE_ANGULAR]) @ state.R_WB.T  # with joints locked, about W's axes
     omega = state.R_WB @ state.v[BASE_ANGULAR]
-    turn = np.array(log_of(product_of(quaternion(body.orientation), inverse_of(quaternion(state.q[BASE_ORIENTATION])))))
-    attitude = course.gains.attitude
-    turning = angular_acceleration + attitude.damping * (angular_velocity - omega) + attitude.stiffness * turn
-    return WholeBodyTarget(
-        body,
-        state.q[JOINT_POSITION],
-        np.zeros(n),
-        np.zeros(n),
-        inertia @ omega,
-        inertia @ turning,
-        shared_load(state, total),
-        np.ones(len(state.contact_positions), dtype=np.bool_),
-    )
+    turn = np.array(log_of(product_of(orientation, inverse_of(quaternion(state.q[BASE_ORIENTATION])))))
+    turning = attitude.damping * (body.angular_velocity - omega) + attitude.stiffness * turn
+    target.angular_momentum[:] = inertia @ omega
+    target.angular_momentum_rate[:] = inertia @ (body.angular_acceleration + turning)
+    target.joint_position[:] = state.q[JOINT_POSITION]
+    target.force[:] = shared_load(state, total)
 
 
 class Fold:

@@ -62,7 +62,7 @@ class ContactSense:
             state: of the robot.
             torque: that the motors gave, mean since the last update ``(n,)`` [N·m].
         """
-        before, self._before = self._before, (time, state.v)
+        before, self._before = self._before, (time, state.v.copy())
         if before is None or time <= before[0]:
             return np.zeros(len(state.contact_positions), dtype=bool)
         dt = time - before[0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import time
 
 import numpy as np
@@ -26,7 +27,7 @@ class ProblemController(Controller):
         solve = self._qp.solve
 
         def kept(*problem: np.ndarray) -> Solution:
-            self.problems.append(problem)
+            self.problems.append(copy.deepcopy(problem))  # the next tick overwrites the state
             return solve(*problem)
 
         self._qp.solve = kept

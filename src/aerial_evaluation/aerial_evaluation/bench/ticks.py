@@ -70,11 +70,12 @@ class TimedController(Controller):
         for times in self.times.values():
             times.clear()  # those of the rehearsal
         self._estimator.update = self._timed("estimate", self._estimator.update)
-        self._estimator.kinematics.at = self._timed("kinematics", self._estimator.kinematics.at)
+        self._estimator.kinematics.computed = self._timed("kinematics", self._estimator.kinematics.computed)
         self._phases.target = self._timed("target", self._phases.target)
         self._accelerations = self._timed("hierarchy", self._accelerations)
         self._qp.solve = self._timed("qp", self._qp.solve)
         self._qp.within = self._timed("qp", self._qp.within)
+        self._drive.exceeds = self._timed("torque", self._drive.exceeds)
         self._drive.room = self._timed("torque", self._drive.room)
         self._drive.command = self._timed("torque", self._drive.command)
 

@@ -6,6 +6,7 @@ minutes. TSID and its dependencies are free software (BSD and the like); nothing
 
 from __future__ import annotations
 
+import copy
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from aerial_evaluation.bench.subject import Subject
 from aerial_evaluation.bench.ticks import Recording, TimedController, record, spread
 from aerial_model.kinematics import Configuration
 from aerial_model.robot import Robot
+from aerial_wbic.controller import Controller
 from aerial_wbic.gains import ControllerGains, QpSolver
 from aerial_wbic.target import WholeBodyTarget
 
@@ -31,8 +33,8 @@ PEER = Peer(
 )
 
 
-class FollowingController(TimedController):
-    """A timed controller that keeps what every tick saw and wanted."""
+class FollowingController(Controller):
+    """A controller that keeps what every tick saw and wanted."""
 
     def __init__(self, robot: Robot) -> None:
         super().__init__(robot)
@@ -40,7 +42,7 @@ class FollowingController(TimedController):
         accelerations = self._accelerations
 
         def kept(state: Configuration, target: WholeBodyTarget) -> tuple[np.ndarray, np.ndarray]:
-            self.followed.append((state, target))
+            self.followed.append(copy.deepcopy((state, target)))  # the next tick overwrites them
             return accelerations(state, target)
 
         self._accelerations = kept
@@ -69,13 +71,20 @@ def tsid(subject: Subject) -> list[Row]:
 def _row(subject: Subject, recording: Recording, solver: QpSolver, environment: Environment) -> Row:
     robot = subject.robot.with_section("controller", qp_solver=solver)
     whole, after, peers = [], [], []
+    following, controller = FollowingController(robot), Controller(robot)
+    for _ in recording.replay(following):
+        pass
+    followed = np.array([target.contact.all() for _, target in following.followed])
+    asked = problem(robot, [following.followed[k] for k in np.flatnonzero(followed)])
     for repeat in range(subject.repeats + 1):
         subject.progress(f"tsid: {recording.motion} with {solver}, {repeat} of {subject.repeats}")
-        controller = FollowingController(robot)
+        controller.reset()
         ticks = np.array(list(recording.replay(controller)))
-        followed = np.array([target.contact.all() for _, target in controller.followed])
-        estimating = np.array(controller.times["estimate"])
-        answer = environment.solve(problem(robot, [controller.followed[k] for k in np.flatnonzero(followed)]))
+        timed = TimedController(robot)
+        for _ in recording.replay(timed):
+            pass
+        estimating = np.array(timed.times["estimate"])
+        answer = environment.solve(asked)
         if repeat:  # the first warms caches up
             whole += ticks[followed].tolist()
             after += (ticks - estimating)[followed].tolist()
