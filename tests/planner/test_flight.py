@@ -20,7 +20,12 @@ def model(robot):
 
 def path(robot, tuck="tuck"):
     return FlightPath(
-        turning=5, ready=14, tuck=robot.poses[tuck], landing=robot.poses["landing"], fraction=np.zeros(16)
+        turning=5,
+        ready=14,
+        tuck=robot.poses[tuck],
+        reach=robot.poses["landing"] + (0.0 if tuck == "home" else 0.1),
+        landing=robot.poses["landing"],
+        fraction=np.zeros(16),
     )
 
 

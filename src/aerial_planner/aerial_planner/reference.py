@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from aerial_model import rotation
-from aerial_model.robot import BASE_ORIENTATION, JOINT_POSITION, Robot
+from aerial_model.kinematics import Kinematics
+from aerial_model.robot import BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY, Robot
 from aerial_planner.inverse_kinematics import InverseKinematics
 from aerial_planner.schedule import GRAVITY, Schedule
 from aerial_planner.settings import PlannerSettings
@@ -17,7 +19,7 @@ from aerial_planner.symbolic import BaseFrameModel
 _TUCKED_AT = (
     0.3  # share of the flight after which the legs are tucked: early, as front feet meet a platform's edge first
 )
-_READY_AT = 0.9  # share of the flight after which they are in the landing pose
+_READY_AT = 0.9  # share of the flight after which they reach for the ground
 _LIFT_OFF_RISE = 0.1  # of the centre of mass above its standing height, as a share of it: the reference's
 _STRETCHED_RISE = 0.25  # the same, at the most: the legs' longest way to the tuck starts here
 _FOLDING_SPEED = 0.55  # share of the no-load speed the legs may take; a short flight tucks less
@@ -26,22 +28,24 @@ _LONG_SUPPORT = 0.4  # half the length of a support, over the height, that catch
 _DROP_MAX, _DROP_STEP = 0.2, 0.02  # by which it may land lower, as a share of the height
 _REACHED = 2e-3  # [m] that feet may miss in the landing pose
 _PUSHED = 0.3  # share of the take-off that it lasts at lift-off speed, on average
+_LITTLE = 1e-3  # [m] by which feet are moved to see how the legs move
 _NEARBY = 1e-9  # [m]
 
 
 @dataclass(frozen=True, kw_only=True)
 class FlightPath:
-    """The legs' path through the flight: a smooth step to the tuck, then one to the landing pose."""
+    """The legs' path through the flight: a smooth step to the tuck, one to the reach, then faster and faster to landing."""
 
     turning: int  # knot at which the legs are tucked
-    ready: int  # knot at which they are in the landing pose
+    ready: int  # knot at which they reach for the ground
     tuck: np.ndarray  # (n,) [rad]
+    reach: np.ndarray  # (n,) [rad]
     landing: np.ndarray  # (n,) [rad]
     fraction: np.ndarray  # (M,) share of the remaining way to the pose ahead covered in each interval
 
     def parameters(self, k: int) -> np.ndarray:
         """Return share of the flight time, fraction and pose ahead of interval ``k`` as one vector ``(2 + n,)``."""
-        pose = self.tuck if k < self.turning else self.landing
+        pose = self.tuck if k < self.turning else self.reach if k < self.ready else self.landing
         return np.concatenate([[1 / len(self.fraction), self.fraction[k]], pose])
 
     def at_knots(self, start: np.ndarray) -> np.ndarray:
@@ -51,11 +55,15 @@ class FlightPath:
     def at(self, start: np.ndarray, time: np.ndarray, flight_time: float) -> tuple[np.ndarray, np.ndarray]:
         """Return joint positions [rad] and rates [rad/s] ``(K, n)`` at ``time`` ``(K,)`` [s] from a take-off pose."""
         dt = flight_time / len(self.fraction)
+        time = np.asarray(time)[:, None]
         turning, ready = self.turning * dt, self.ready * dt
-        up, up_rate = _smooth_step(np.asarray(time)[:, None] / turning)
-        down, down_rate = _smooth_step((np.asarray(time)[:, None] - turning) / (ready - turning))
-        position = start + up * (self.tuck - start) + down * (self.landing - self.tuck)
-        rate = up_rate / turning * (self.tuck - start) + down_rate / (ready - turning) * (self.landing - self.tuck)
+        up, up_rate = _smooth_step(time / turning)
+        down, down_rate = _smooth_step((time - turning) / (ready - turning))
+        left = flight_time - ready
+        back, back_rate = _run_up((time - ready) / left)
+        ways = self.tuck - start, self.reach - self.tuck, self.landing - self.reach
+        position = start + up * ways[0] + down * ways[1] + back * ways[2]
+        rate = up_rate / turning * ways[0] + down_rate / (ready - turning) * ways[1] + back_rate / left * ways[2]
         return position, rate
 
 
@@ -100,8 +108,11 @@ def body_reference(
     velocity = (landing_com - lift_off) / T + [0.0, 0.0, 0.5 * GRAVITY * T]
     R_landing = rotation.matrix(schedule.landing_orientation)
     lead = _landing_lead(landing_feet @ R_landing.T, height, landing_com - lift_off, schedule, settings)
-    landing_pose, drop = _landing_pose(landing_feet + lead @ R_landing, height, robot, model, ik)
-    landing_com = landing_com - lead - [0.0, 0.0, drop]
+    fall = 0.5 * GRAVITY * T - (landing_com - lift_off)[2] / T
+    turning, ready = _turning_knots(schedule.flight_knots)
+    share = 1 - ready / schedule.flight_knots  # of the flight, in which the feet are drawn up
+    landing = _landing(landing_feet + lead @ R_landing, height, fall, T, share, robot, model, ik)
+    landing_com = landing_com - lead - [0.0, 0.0, landing.drop]
 
     stretched = ik.solve(((feet - com_0 - [0.0, 0.0, _STRETCHED_RISE * height]) @ R)[None], q_j)[0]
     N = len(schedule.contact)
@@ -126,8 +137,8 @@ def body_reference(
         x_0=np.concatenate([com_0, np.zeros(6), quaternion, q_j]),
         landing_com=landing_com,
         landing_com_height=height,
-        landing_joint_position=landing_pose,
-        flight_path=_flight_path(schedule, robot, stretched, landing_pose),
+        landing_joint_position=landing.pose,
+        flight_path=_flight_path(schedule, robot, stretched, landing, turning, ready),
     )
 
 
@@ -170,20 +181,56 @@ def _landing_lead(
     return (little + falling * max(far - little, 0.0)) * direction
 
 
-def _landing_pose(
-    feet: np.ndarray, height: float, robot: Robot, model: BaseFrameModel, ik: InverseKinematics
-) -> tuple[np.ndarray, float]:
-    """Return the pose ``(n,)`` [rad] that has the feet ``(n_c, 3)`` [m] from the centre of mass, in B, and its drop [m].
+class _Landing(NamedTuple):
+    """How the legs meet the ground."""
 
-    Legs that do not reach so far ahead let the centre of mass come down lower.
+    reach: np.ndarray  # joint positions from which the feet are drawn up to meet it softly (n,) [rad]
+    pose: np.ndarray  # joint positions at touchdown (n,) [rad]
+    drop: float  # of the centre of mass at touchdown below its height in the landing pose [m]
+
+
+def _landing(
+    feet: np.ndarray,
+    height: float,
+    fall: float,
+    flight_time: float,
+    share: float,
+    robot: Robot,
+    model: BaseFrameModel,
+    ik: InverseKinematics,
+) -> _Landing:
+    """Return a landing with the feet ``(n_c, 3)`` [m] from the centre of mass, in B, which comes at ``fall`` [m/s].
+
+    Legs and rotors do not stop as one with the body: if they weigh μ of its mass at the feet, their impact takes
+    μ / (1 + μ) of the fall at once, and throws a robot with straight legs or strong gears off the ground. So the feet
+    are drawn up at that part of the fall when they touch the ground, evenly faster in the last ``share`` of the flight.
+    Legs that do not reach so far ahead, or are too straight to be drawn up so fast, let the centre of mass come down
+    lower.
     """
+    up = np.array([0.0, 0.0, 1.0])
     depths = np.arange(0.0, _DROP_MAX, _DROP_STEP) * height
-    targets = feet + np.array([0.0, 0.0, 1.0]) * depths[:, None, None]
+    targets = feet + up * depths[:, None, None]
     poses = ik.solve(targets, robot.poses["landing"])
-    relative = np.array([np.asarray(model.feet(q) - ca.repmat(model.com(q), 1, len(feet))).T for q in poses])
-    missing = np.linalg.norm(relative - targets, axis=2).max(axis=1)
-    best = int(np.argmax(missing < _REACHED)) if np.any(missing < _REACHED) else int(np.argmin(missing))
-    return poses[best], float(depths[best])
+    per_metre = (ik.solve(targets + _LITTLE * up, poses) - poses) / _LITTLE  # [rad/m]
+    shares = np.array([_rigid_share(robot, pose, rate) for pose, rate in zip(poses, per_metre, strict=True)])
+    rates = ((fall + depths / flight_time) * shares)[:, None] * per_metre
+    reaches = poses - 0.5 * share * flight_time * rates
+    relative = [np.asarray(model.feet(q) - ca.repmat(model.com(q), 1, len(feet))).T for q in poses]
+    missing = np.linalg.norm(np.array(relative) - targets, axis=2).max(axis=1)
+    low, high = robot.planning_range
+    supple = np.all((low <= reaches) & (reaches <= high), axis=1)
+    supple &= np.all(np.abs(rates) <= _FOLDING_SPEED * robot.actuators.no_load_speed, axis=1)
+    reached = missing < _REACHED
+    best = int(next((np.argmax(fit) for fit in (reached & supple, reached) if fit.any()), np.argmin(missing)))
+    return _Landing(np.clip(reaches[best], low, high), poses[best], float(depths[best]))
+
+
+def _rigid_share(robot: Robot, pose: np.ndarray, rate: np.ndarray) -> float:
+    """Return μ / (1 + μ) of legs that move by ``rate`` ``(n,)`` [rad/m] when their feet move by a metre."""
+    q = np.concatenate([np.zeros(6), [1.0], pose])
+    M = Kinematics(robot).at(q, np.zeros(robot.model.nv)).M[JOINT_VELOCITY, JOINT_VELOCITY]
+    mu = rate @ M @ rate / robot.mass
+    return float(mu / (1 + mu))
 
 
 def _foot_clearance(schedule: Schedule, settings: PlannerSettings) -> np.ndarray:
@@ -218,28 +265,41 @@ def _turn(schedule: Schedule, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return share * (time / rising) ** 2, rate * (time / rising)
 
 
-def _flight_path(schedule: Schedule, robot: Robot, stretched: np.ndarray, landing: np.ndarray) -> FlightPath:
-    """Return the path that tucks as far as the legs can fold and stretch in time."""
-    M, dt = schedule.flight_knots, schedule.flight_time_range[0] / schedule.flight_knots
+def _turning_knots(M: int) -> tuple[int, int]:
+    """Return the knots of M + 1 at which the legs are tucked, and at which they reach for the ground."""
     turning = max(1, round(_TUCKED_AT * M))
-    ready = max(turning + 1, round(_READY_AT * M))
+    return turning, max(turning + 1, round(_READY_AT * M))
+
+
+def _flight_path(
+    schedule: Schedule, robot: Robot, stretched: np.ndarray, landing: _Landing, turning: int, ready: int
+) -> FlightPath:
+    """Return the path that tucks as far as the legs can fold and stretch in time."""
+    reach = landing.reach
+    M, dt = schedule.flight_knots, schedule.flight_time_range[0] / schedule.flight_knots
     travel = _FOLDING_SPEED * robot.actuators.no_load_speed * dt / _SMOOTH_STEP_PEAK  # per interval (n,) [rad]
-    fold = robot.poses["tuck"] - landing
+    fold = robot.poses["tuck"] - reach
     depth = 1.0  # of the tuck
-    for way, intervals in ((landing - stretched, turning), (np.zeros_like(landing), ready - turning)):
+    for way, intervals in ((reach - stretched, turning), (np.zeros_like(reach), ready - turning)):
         # |way + depth · fold| ≤ travel · intervals, joint by joint
         room = np.sign(fold) * -way + travel * intervals
         folding = np.abs(fold) > 0
         depth = min(depth, *np.clip(room[folding] / np.abs(fold[folding]), 0.0, 1.0), 1.0)
-    tuck = landing + depth * fold
+    tuck = reach + depth * fold
     fraction = np.zeros(M)
-    for first, last in ((0, turning), (turning, ready)):
-        way, _ = _smooth_step(np.linspace(0.0, 1.0, last - first + 1))
+    for first, last, course in ((0, turning, _smooth_step), (turning, ready, _smooth_step), (ready, M, _run_up)):
+        way, _ = course(np.linspace(0.0, 1.0, last - first + 1))
         fraction[first:last] = np.diff(way) / (1 - way[:-1])
-    return FlightPath(turning=turning, ready=ready, tuck=tuck, landing=landing, fraction=fraction)
+    return FlightPath(turning=turning, ready=ready, tuck=tuck, reach=reach, landing=landing.pose, fraction=fraction)
 
 
 def _smooth_step(s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return 3s² − 2s³ and its derivative, s held to [0, 1]."""
     s = np.clip(s, 0.0, 1.0)
     return s**2 * (3 - 2 * s), 6 * s * (1 - s)
+
+
+def _run_up(s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return s² and its derivative, s held to [0, 1]."""
+    s = np.clip(s, 0.0, 1.0)
+    return s**2, 2 * s

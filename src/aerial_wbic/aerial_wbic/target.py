@@ -95,13 +95,13 @@ class Hold:
 
     All contact points are taken to be on the ground. The way to rest is one of the centre of mass *relative to the
     centre of its support* and of the attitude, from how the robot moves at the beginning: neither an early nor a late
-    touchdown makes the error jump. A fall is caught within a given depth; forward speed is braked while the feet bear
-    that load, which is when friction can. A rotation is caught within a given angle.
+    touchdown makes the error jump. A fall is caught within a given depth, and forward speed as fast: only while the feet
+    bear that load do friction and the length of the support let them. A rotation is caught within a given angle.
 
     Args:
         state: of the robot at the beginning.
         time: of the beginning [s].
-        rate: at which motion dies away [1/s]; falling and turning faster where the depth and the turn ask for it.
+        rate: at which motion dies away [1/s]; faster where the depth and the turn ask for it.
         com_height: of the centre of mass above the centre of the contact spheres, at rest [m].
         depth: to which a fall is caught [m].
         turn: to which a rotation is caught [rad].
@@ -120,7 +120,6 @@ class Hold:
         gains: BodyGains,
     ) -> None:
         velocity = state.com_velocity
-        rates = np.array([rate, rate, max(rate, REACH * abs(velocity[2]) / depth)])
         offset = state.com - support_centre(state)
         self._rest = np.array([0.0, 0.0, com_height])
         # The attitude as a rotation vector from the level attitude of the present heading.
@@ -129,7 +128,7 @@ class Hold:
         spin = state.R_WB @ state.v[BASE_ANGULAR]
         self._course = _Course(
             begin=time,
-            offset=settling(offset, velocity, self._rest, rates),
+            offset=settling(offset, velocity, self._rest, max(rate, REACH * abs(velocity[2]) / depth)),
             tilt=settling(tilt, spin, np.zeros(3), max(rate, REACH * float(np.linalg.norm(spin)) / turn)),
             level=level,
         )
