@@ -212,8 +212,7 @@ def _landing(
     targets = feet + up * depths[:, None, None]
     poses = ik.solve(targets, robot.poses["landing"])
     per_metre = (ik.solve(targets + _LITTLE * up, poses) - poses) / _LITTLE  # [rad/m]
-    shares = np.array([_rigid_share(robot, pose, rate) for pose, rate in zip(poses, per_metre, strict=True)])
-    rates = ((fall + depths / flight_time) * shares)[:, None] * per_metre
+    rates = ((fall + depths / flight_time) * _rigid_share(robot, poses, per_metre))[:, None] * per_metre
     reaches = poses - 0.5 * share * flight_time * rates
     relative = [np.asarray(model.feet(q) - ca.repmat(model.com(q), 1, len(feet))).T for q in poses]
     missing = np.linalg.norm(np.array(relative) - targets, axis=2).max(axis=1)
@@ -225,12 +224,15 @@ def _landing(
     return _Landing(np.clip(reaches[best], low, high), poses[best], float(depths[best]))
 
 
-def _rigid_share(robot: Robot, pose: np.ndarray, rate: np.ndarray) -> float:
-    """Return μ / (1 + μ) of legs that move by ``rate`` ``(n,)`` [rad/m] when their feet move by a metre."""
-    q = np.concatenate([np.zeros(6), [1.0], pose])
-    M = Kinematics(robot).at(q, np.zeros(robot.model.nv)).M[JOINT_VELOCITY, JOINT_VELOCITY]
-    mu = rate @ M @ rate / robot.mass
-    return float(mu / (1 + mu))
+def _rigid_share(robot: Robot, poses: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """Return μ / (1 + μ) ``(K,)`` of legs in ``poses`` that move by ``rates`` [rad/m], both ``(K, n)``, as their feet do."""
+    kinematics, still = Kinematics(robot), np.zeros(robot.model.nv)
+    standing = np.concatenate([np.zeros(6), [1.0]])
+    mu = np.empty(len(poses))
+    for k, (pose, rate) in enumerate(zip(poses, rates, strict=True)):
+        M = kinematics.at(np.concatenate([standing, pose]), still).M[JOINT_VELOCITY, JOINT_VELOCITY]
+        mu[k] = rate @ M @ rate / robot.mass
+    return mu / (1 + mu)
 
 
 def _foot_clearance(schedule: Schedule, settings: PlannerSettings) -> np.ndarray:

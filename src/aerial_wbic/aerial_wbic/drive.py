@@ -122,10 +122,7 @@ def _room(velocity: np.ndarray, measured_velocity: np.ndarray, law: _Law) -> Roo
 @compiled
 def _exceeds(torque: np.ndarray, velocity: np.ndarray, measured_velocity: np.ndarray, law: _Law) -> bool:
     room = _room(velocity, measured_velocity, law)
-    for j in range(len(torque)):
-        if torque[j] < room.least[j] or torque[j] > room.greatest[j]:
-            return True
-    return False
+    return bool(np.any(torque < room.least) or np.any(torque > room.greatest))
 
 
 @compiled

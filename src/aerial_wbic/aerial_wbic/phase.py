@@ -17,7 +17,7 @@ from aerial_model.kinematics import Configuration
 from aerial_model.plan import Plan
 from aerial_model.robot import Robot
 from aerial_wbic.gains import ControllerGains, Touchdown
-from aerial_wbic.target import Fold, Hold, PostureTarget, WholeBodyTarget, from_plan
+from aerial_wbic.target import Fold, Hold, PostureTarget, WholeBodyTarget, from_plan, waiting
 
 
 class Phase(IntEnum):
@@ -158,8 +158,8 @@ class Phases:
     def target(self, state: Configuration) -> WholeBodyTarget | PostureTarget | None:
         """Return what to do now, seen where the robot is; None: nothing but to damp the joints."""
         if self.phase in FOLLOWING:
-            time = min(self._plan_time, self.plan.landing_time)  # whoever waits for a contact holds the landing pose
-            return from_plan(self.plan.sample(time), self._gains.follow)
+            target = from_plan(self.plan.sample(min(self._plan_time, self.plan.landing_time)), self._gains.follow)
+            return target if self._plan_time <= self.plan.landing_time + _INSTANT else waiting(target)
         if self._next_way is not None:
             self._way, self._next_way = self._next_way(state), None
         if isinstance(self._way, Hold) and state.R_WB[2, 2] < self._upright_min:

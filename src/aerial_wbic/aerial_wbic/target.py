@@ -90,6 +90,12 @@ def from_plan(sample: plans.Target, gains: BodyGains) -> WholeBodyTarget:
     )
 
 
+def waiting(target: WholeBodyTarget) -> WholeBodyTarget:
+    """Return a target with the joints at rest where it has them: for who waits in the landing pose for a contact."""
+    still = np.zeros_like(target.joint_velocity)
+    return target._replace(joint_velocity=still, joint_acceleration=still.copy())
+
+
 class Hold:
     """Comes to rest, level, over the centre of the support, and stays there.
 
