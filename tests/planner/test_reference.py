@@ -42,9 +42,9 @@ def drawn_up(robot, pose, rate):
 
 
 @pytest.mark.parametrize("displacement", GOALS, ids=str)
-def test_feet_meet_the_ground_drawn_up_by_the_part_of_the_fall_that_their_impact_takes(a_robot, displacement):
-    robot, model = a_robot
-    schedule, reference = jump(robot, model, displacement)
+def test_feet_meet_the_ground_drawn_up_by_the_part_of_the_fall_that_their_impact_takes(displacement):
+    robot = Robot.load("mit_humanoid")
+    schedule, reference = jump(robot, base_frame_model(robot), displacement)
     T = schedule.flight_time
     position, rate = reference.flight_path.at(robot.poses["home"], np.array([T - 1e-9]), T)
     np.testing.assert_allclose(position[0], reference.landing_joint_position, atol=1e-6)
@@ -56,6 +56,12 @@ def test_feet_meet_the_ground_drawn_up_by_the_part_of_the_fall_that_their_impact
     legs = pin.crba(robot.model, robot.model.createData(), q)[6:, 6:]
     mu = rate[0] @ legs @ rate[0] / velocity[:, 2].mean() ** 2 / robot.mass
     assert velocity[:, 2].mean() == pytest.approx(mu / (1 + mu) * fall, rel=0.1)
+
+
+def test_feet_of_light_legs_are_at_rest_when_they_meet_the_ground():
+    robot = Robot.load("mini_cheetah")
+    _, reference = jump(robot, base_frame_model(robot), GOALS[1])
+    np.testing.assert_array_equal(reference.flight_path.reach, reference.flight_path.landing)
 
 
 @pytest.mark.parametrize("displacement", GOALS, ids=str)

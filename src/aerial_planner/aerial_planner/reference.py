@@ -28,6 +28,9 @@ _LONG_SUPPORT = 0.4  # half the length of a support, over the height, that catch
 _DROP_MAX, _DROP_STEP = 0.2, 0.02  # by which it may land lower, as a share of the height
 _REACHED = 2e-3  # [m] that feet may miss in the landing pose
 _PUSHED = 0.3  # share of the take-off that it lasts at lift-off speed, on average
+_HARMLESS = (
+    0.2  # part of the fall that legs' impact may take: to draw feet up for less turns a rolling body more than it saves
+)
 _LITTLE = 1e-3  # [m] by which feet are moved to see how the legs move
 _NEARBY = 1e-9  # [m]
 
@@ -225,14 +228,18 @@ def _landing(
 
 
 def _rigid_share(robot: Robot, poses: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """Return μ / (1 + μ) ``(K,)`` of legs in ``poses`` that move by ``rates`` [rad/m], both ``(K, n)``, as their feet do."""
+    """Return μ / (1 + μ) ``(K,)`` of legs in ``poses`` that move by ``rates`` [rad/m], both ``(K, n)``, as their feet do.
+
+    It is 0 where the impact is harmless.
+    """
     kinematics, still = Kinematics(robot), np.zeros(robot.model.nv)
     standing = np.concatenate([np.zeros(6), [1.0]])
     mu = np.empty(len(poses))
     for k, (pose, rate) in enumerate(zip(poses, rates, strict=True)):
         M = kinematics.at(np.concatenate([standing, pose]), still).M[JOINT_VELOCITY, JOINT_VELOCITY]
         mu[k] = rate @ M @ rate / robot.mass
-    return mu / (1 + mu)
+    share = mu / (1 + mu)
+    return np.where(share < _HARMLESS, 0.0, share)
 
 
 def _foot_clearance(schedule: Schedule, settings: PlannerSettings) -> np.ndarray:
