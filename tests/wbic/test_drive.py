@@ -6,9 +6,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from aerial_model.robot import JOINT_VELOCITY
+from aerial_model.kinematics import Kinematics
+from aerial_model.robot import JOINT_VELOCITY, Robot
 from aerial_model.state import Measurement
 from aerial_wbic.drive import Drive
+from aerial_wbic.gains import ControllerGains
 from aerial_wbic.qp import ForceOptimization
 from aerial_wbic.target import PostureTarget
 
@@ -91,6 +93,20 @@ def test_torques_at_the_end_of_their_room_ask_for_the_share_of_the_limits(robot,
         requested = torque + along
         use = np.maximum(law.torque_ratio(requested), law.voltage_ratio(requested, measurement.joint_velocity))
         np.testing.assert_allclose(use, gains.actuator_share)
+
+
+def test_arms_beyond_their_room_are_clipped_and_do_not_count():
+    """No force on the feet would help them."""
+    robot = Robot.load("mit_humanoid")
+    drive = Drive(robot, robot.section("controller", ControllerGains))
+    state = Kinematics(robot).at(robot.standing_configuration(), np.zeros(robot.model.nv))
+    torque, v_ref = np.zeros(robot.n_joints), np.zeros(robot.model.nv)
+    torque[robot.arms] = 2 * robot.actuators.torque_max[robot.arms]
+    assert not drive.exceeds(torque, v_ref, measured(state))
+    asked = drive.command(torque, v_ref, measured(state)).torque
+    assert np.all(asked[robot.arms] <= robot.actuators.torque_max[robot.arms])
+    torque[0] = 2 * robot.actuators.torque_max[0]
+    assert drive.exceeds(torque, v_ref, measured(state))
 
 
 def test_a_stopped_robot_only_resists_motion(gains, drive, state_at):

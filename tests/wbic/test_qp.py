@@ -216,10 +216,3 @@ def test_with_enough_room_nothing_changes(optimization, state_at):
     plain = optimization.solve(state, *landing(state), contact)
     limited = optimization.within(room_of(state, 50.0), plain, state, *landing(state), contact)
     np.testing.assert_allclose(limited.force, plain.force, atol=FORCE_TOLERANCE)
-
-
-def test_in_flight_no_limit_can_be_kept(optimization, state_at):
-    state = state_at(moving=False)
-    none = np.zeros(4, dtype=bool)
-    plain = optimization.solve(state, *landing(state), none)
-    assert optimization.within(room_of(state, 0.0), plain, state, *landing(state), none) is plain

@@ -100,7 +100,7 @@ class Controller:
         wish = state, vdot_cmd, target.force, target.contact
         solution = self._qp.solve(*wish)
         self._fallback_ticks += not solution.solved
-        if self._drive.exceeds(solution.torque, v_ref, measurement):
+        if target.contact.any() and self._drive.exceeds(solution.torque, v_ref, measurement):
             solution = self._qp.within(self._drive.room(v_ref, measurement), solution, *wish)
         return self._drive.command(solution.torque, v_ref, measurement)
 

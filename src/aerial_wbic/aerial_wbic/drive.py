@@ -45,6 +45,7 @@ class Drive:
     def __init__(self, robot: Robot, gains: ControllerGains) -> None:
         self._law = _Law.of(robot.actuators, gains)
         self._arms = robot.arms
+        self._legs = np.setdiff1d(np.arange(robot.n_joints), robot.arms)
         n = robot.n_joints
         self._zeros = np.zeros(n)
         self._posture_stiffness = np.full(n, gains.posture_stiffness)
@@ -52,8 +53,8 @@ class Drive:
         self.saturated_ticks = 0
 
     def exceeds(self, torque: np.ndarray, v_ref: np.ndarray, measurement: Measurement) -> bool:
-        """Return whether a torque ``(n,)`` [N·m] leaves the room there is; the rest as for ``room``."""
-        return _exceeds(torque, v_ref[JOINT_VELOCITY], measurement.joint_velocity, self._law)
+        """Return whether a torque ``(n,)`` [N·m] of a joint that can bear load leaves its room; the rest as for ``room``."""
+        return _exceeds(torque, v_ref[JOINT_VELOCITY], measurement.joint_velocity, self._legs, self._law)
 
     def command(self, torque: np.ndarray, v_ref: np.ndarray, measurement: Measurement) -> Command:
         """Return the command for the torques that the equations of motion ask for.
@@ -120,9 +121,12 @@ def _room(velocity: np.ndarray, measured_velocity: np.ndarray, law: _Law) -> Roo
 
 
 @compiled
-def _exceeds(torque: np.ndarray, velocity: np.ndarray, measured_velocity: np.ndarray, law: _Law) -> bool:
+def _exceeds(
+    torque: np.ndarray, velocity: np.ndarray, measured_velocity: np.ndarray, legs: np.ndarray, law: _Law
+) -> bool:
     room = _room(velocity, measured_velocity, law)
-    return bool(np.any(torque < room.least) or np.any(torque > room.greatest))
+    beyond = (torque < room.least) | (torque > room.greatest)
+    return bool(np.any(beyond[legs]))
 
 
 @compiled

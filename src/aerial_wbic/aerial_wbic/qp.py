@@ -82,13 +82,11 @@ class ForceOptimization:
         f_cmd: np.ndarray,
         contact: np.ndarray,
     ) -> Solution:
-        """Return the solution of (3.24) with limits, or the given one of ``solve`` when there is none or nothing bears load.
+        """Return the solution of (3.24) with limits, or the given one of ``solve`` when there is none.
 
-        Limits are those of the limbs that bear load; what no force on them could keep is not asked for. The rest as
-        for ``solve``.
+        Limits are those of the limbs that bear load, one at least; what no force on them could keep is not asked for. The
+        rest as for ``solve``.
         """
-        if not contact.any():
-            return solution
         df = self._limited[np.count_nonzero(contact) - 1].solve(state, vdot_cmd, f_cmd, contact, room)
         limited = self._solution(state, vdot_cmd, f_cmd, contact, df)
         return limited._replace(solved=solution.solved) if limited.solved else solution
