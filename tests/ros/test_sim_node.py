@@ -13,7 +13,8 @@ from std_srvs.srv import SetBool
 from aerial_model.request import MotionRequest
 from aerial_model.robot import Robot
 from aerial_model.ros import qos
-from aerial_model.ros.messages import command_to_message, selection_to_message, to_stamp
+from aerial_model.ros.messages import selection_to_message
+from aerial_model.ros.wire import CommandWire
 from aerial_model.state import Command
 from aerial_model.terrain import Terrain
 from aerial_msgs.msg import GroundTruth, JointCommand, MotionResult, MotionSelection, RobotState
@@ -38,6 +39,7 @@ class Peer(Node):
     def __init__(self, robot, real_time):
         super().__init__("peer")
         zero = np.zeros(robot.n_joints)
+        self._wire = CommandWire(robot)
         self.command = Command(
             torque=zero, position=robot.poses["home"], velocity=zero, stiffness=zero + 100.0, damping=zero + 2.0
         )
@@ -60,7 +62,7 @@ class Peer(Node):
 
     def send(self, command, state):
         command = dataclasses.replace(command, state_sequence=state.sequence)
-        self._commands.publish(command_to_message(command, to_stamp(0.0)))
+        self._commands.publish(self._wire.write(command))
 
     def _hear(self, name, message):
         self.heard.setdefault(name, []).append(message)

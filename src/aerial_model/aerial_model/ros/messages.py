@@ -1,4 +1,4 @@
-"""Messages from and to the model's types: every conversion is here, once, and explicit.
+"""Messages from and to the model's types: conversions are here, once, and explicit; those of the control loop in ``wire``.
 
 rclpy does not check fields unless it is told to, and a wrong type becomes garbage on the wire: numbers are made
 Python's own, arrays ``array('d')`` or NumPy's float64.
@@ -6,6 +6,7 @@ Python's own, arrays ``array('d')`` or NumPy's float64.
 
 from __future__ import annotations
 
+import math
 from array import array
 from collections.abc import Sequence
 
@@ -18,11 +19,11 @@ from aerial_model.errors import ConfigurationError, InvalidPlanError, RefusalCod
 from aerial_model.plan import Plan
 from aerial_model.request import MotionRequest
 from aerial_model.robot import Robot
-from aerial_model.state import Command, Estimate, Measurement
+from aerial_model.state import Estimate
 from aerial_model.terrain import Box, Terrain
-from aerial_msgs.msg import JointCommand, MotionPlan, MotionResult, MotionSelection, RobotState, TerrainBox
+from aerial_msgs.msg import MotionPlan, MotionResult, MotionSelection, TerrainBox
 
-_NANO = 1_000_000_000
+NANO = 1_000_000_000
 
 # Fields of a plan that have the same name and meaning in its message.
 _PLAN_TEXTS = ("request_id", "motion", "robot", "model_hash")
@@ -38,15 +39,22 @@ _OUTCOMES = {
 }
 
 
+def seconds_and_nanoseconds(time: float) -> tuple[int, int]:
+    """Return a time [s] in whole seconds and nanoseconds, rounded; exact for the calendar's 1.8e9 s as well."""
+    seconds = math.floor(time)
+    carry, nanoseconds = divmod(round((time - seconds) * NANO), NANO)
+    return seconds + carry, nanoseconds
+
+
 def to_stamp(time: float) -> Time:
     """Return a time [s] as a stamp, rounded to the nanosecond."""
-    seconds, nanoseconds = divmod(round(time * _NANO), _NANO)
+    seconds, nanoseconds = seconds_and_nanoseconds(time)
     return Time(sec=seconds, nanosec=nanoseconds)
 
 
 def from_stamp(stamp: Time) -> float:
     """Return a stamp as a time [s]."""
-    return stamp.sec + stamp.nanosec / _NANO
+    return stamp.sec + stamp.nanosec / NANO
 
 
 def doubles(values: np.ndarray) -> array:
@@ -213,63 +221,3 @@ def estimate_from_messages(odometry: Odometry, joints: JointState, robot: Robot)
     if not (np.all(np.isfinite(q)) and np.all(np.isfinite(v))):
         return None
     return Estimate(time=from_stamp(odometry.header.stamp), q=q, v=v)
-
-
-# --- the control loop ------------------------------------------------------------------------------------------------
-
-_COMMAND_ROWS = ("torque", "position", "velocity", "stiffness", "damping")
-_STATE_VECTORS = ("orientation", "angular_velocity", "linear_acceleration")
-_STATE_ROWS = ("joint_position", "joint_velocity", "joint_torque")
-
-
-def state_to_message(measurement: Measurement) -> RobotState:
-    """Return the message that carries a measurement."""
-    localization = measurement.localization
-    return RobotState(
-        stamp=to_stamp(measurement.time),
-        sequence=int(measurement.sequence),
-        has_localization=localization is not None,
-        localization=np.zeros(3) if localization is None else np.array(localization, dtype=np.float64),
-        **{name: np.array(getattr(measurement, name), dtype=np.float64) for name in _STATE_VECTORS},
-        **{name: doubles(getattr(measurement, name)) for name in _STATE_ROWS},
-    )
-
-
-def state_from_message(message: RobotState) -> Measurement:
-    """Return the measurement a message carries."""
-    return Measurement(
-        time=from_stamp(message.stamp),
-        sequence=message.sequence,
-        localization=np.array(message.localization) if message.has_localization else None,
-        **{name: np.array(getattr(message, name)) for name in (*_STATE_VECTORS, *_STATE_ROWS)},
-    )
-
-
-def command_to_message(command: Command, stamp: Time) -> JointCommand:
-    """Return the message that carries a command."""
-    return JointCommand(
-        stamp=stamp,
-        state_stamp=to_stamp(command.state_time),
-        state_sequence=int(command.state_sequence),
-        **{name: doubles(getattr(command, name)) for name in _COMMAND_ROWS},
-    )
-
-
-def command_from_message(message: JointCommand, robot: Robot) -> Command:
-    """Return the command a message carries.
-
-    Raises:
-        ValueError: if a field does not hold one finite number for every joint.
-    """
-    rows = {name: np.array(getattr(message, name)) for name in _COMMAND_ROWS}
-    fits = all(len(row) == robot.n_joints for row in rows.values())
-    if not fits or not np.isfinite(np.concatenate(list(rows.values()))).all():
-        for name, row in rows.items():
-            if len(row) != robot.n_joints or not np.isfinite(row).all():
-                expected = f"expected {robot.n_joints} finite numbers"
-                raise ValueError(f"command field {name}: {expected}, found {row.tolist()}")
-    return Command(
-        state_time=from_stamp(message.state_stamp),
-        state_sequence=message.state_sequence,
-        **rows,
-    )

@@ -21,9 +21,10 @@ from aerial_model.errors import ConfigurationError, RefusalError
 from aerial_model.request import ControllerCommand
 from aerial_model.robot import Robot
 from aerial_model.ros import qos
-from aerial_model.ros.messages import command_from_message, selection_from_message, state_to_message, to_stamp
+from aerial_model.ros.messages import selection_from_message, to_stamp
 from aerial_model.ros.node import AerialNode
 from aerial_model.ros.node import main as run
+from aerial_model.ros.wire import CommandWire, StateWire
 from aerial_msgs.msg import GroundTruth, JointCommand, MotionResult, MotionSelection, RobotState
 from aerial_msgs.srv import Disturb, Reset, Step
 from aerial_sim.latency import Latency
@@ -65,10 +66,11 @@ class SimNode(AerialNode):
         self._robot = Robot.load(self._parameter("robot"))
         simulation = Simulation(self._robot, noise=self._parameter("noise"), seed=self._parameter("seed"))
         self._session = Session(simulation)
+        self._state_wire, self._command_wire = StateWire(self._robot), CommandWire(self._robot)
         self._lock = threading.RLock()  # guards the session: the pacing thread and the callbacks use it
         self._real_time: bool = self._parameter("real_time")
         self._active = False
-        self._next: RobotState | None = None  # computed, but not due yet
+        self._next: bytes | None = None  # computed, but not due yet
         self._moving: str | None = None  # request whose motion runs: no time to rebuild the terrain
         self._refused: str | None = None  # request last refused: time need not wait for it
         self._pacer: threading.Thread | None = None
@@ -83,7 +85,7 @@ class SimNode(AerialNode):
         """Publish the first state; in real time, let the clock run."""
         self._description.publish(String(data=self._robot.description.text))
         self._active = True
-        self._publish_state(state_to_message(self._session.measurement))
+        self._publish_state(self._state_wire.write(self._session.measurement))
         if self._real_time:
             self._pacer = threading.Thread(target=self._pace, name="pace", daemon=True)
             self._pacer.start()
@@ -139,7 +141,7 @@ class SimNode(AerialNode):
             *(self._states, self._time, self._joint_states, self._imu, self._description, self._truths)
         ]
         self._subscriptions_made = [
-            self.create_subscription(JointCommand, "joint_command", self._on_command, control),
+            self.create_subscription(JointCommand, "joint_command", self._on_command, control, raw=True),
             self.create_subscription(MotionSelection, "motion_selection", self._on_selection, qos.EVENT),
             self.create_subscription(MotionResult, "motion_result", self._on_result, qos.EVENT),
         ]
@@ -185,7 +187,7 @@ class SimNode(AerialNode):
                     self._publish_next()
 
     def _compute_next(self) -> None:
-        self._next = state_to_message(self._session.advance())
+        self._next = self._state_wire.write(self._session.advance())
 
     def _publish_next(self) -> None:
         measurement = self._session.measurement
@@ -198,7 +200,7 @@ class SimNode(AerialNode):
         if self._tells_truth:
             self._truths.publish(ground_truth_to_message(self._session.simulation.ground_truth(), self._robot))
 
-    def _publish_state(self, message: RobotState) -> None:
+    def _publish_state(self, message: bytes) -> None:
         self._states.publish(message)
         self._published_at[self._session.measurement.sequence % ROUND_TRIP_WINDOW] = time.monotonic()
 
@@ -210,19 +212,19 @@ class SimNode(AerialNode):
             waits = not session.answered and (not self._real_time or not session.started)
             silence = now - self._published_at[session.measurement.sequence % ROUND_TRIP_WINDOW]
             if self._active and waits and silence > REPEAT_PERIOD:
-                self._publish_state(state_to_message(session.measurement))
+                self._publish_state(self._state_wire.write(session.measurement))
             if session.awaited is not None and now > self._wait_until:
                 self.get_logger().warning(f"selection '{session.awaited}' got no answer: time goes on")
                 self._end_wait()
 
     # --- inputs ------------------------------------------------------------------------------------------------------
 
-    def _on_command(self, message: JointCommand) -> None:
+    def _on_command(self, data: bytes) -> None:
         try:
-            command = command_from_message(message, self._robot)
+            command = self._command_wire.read(data)
         except ValueError as error:
             self._rejected_commands += 1
-            self.get_logger().error(str(error), throttle_duration_sec=1.0)
+            self.get_logger().error(f"a command is ignored: {error}", throttle_duration_sec=1.0)
             return
         received = time.monotonic()
         with self._lock:
@@ -275,7 +277,7 @@ class SimNode(AerialNode):
             self._session.reset(request.seed)
             self._round_trip, self._late_ticks, self._rejected_commands = Latency(), 0, 0
             self._moving = self._next = None
-            self._publish_state(state_to_message(self._session.measurement))
+            self._publish_state(self._state_wire.write(self._session.measurement))
         response.success = True
         return response
 

@@ -20,12 +20,11 @@ from aerial_model.request import ControllerCommand
 from aerial_model.robot import Robot
 from aerial_model.ros import node, qos
 from aerial_model.ros.messages import (
-    command_to_message,
     plan_from_message,
     result_to_message,
-    state_from_message,
     to_stamp,
 )
+from aerial_model.ros.wire import CommandWire, StateWire
 from aerial_model.state import Command, Measurement
 from aerial_msgs.msg import ControllerStatus, JointCommand, MotionPlan, MotionResult, MotionSelection, RobotState
 from aerial_wbic.controller import Controller
@@ -56,6 +55,7 @@ class WbicNode(node.AerialNode):
         """Load the robot, make the controller, open the interfaces."""
         self._robot = Robot.load(self.get_parameter("robot").value)
         self._controller = Controller(self._robot)
+        self._state_wire, self._command_wire = StateWire(self._robot), CommandWire(self._robot)
         self._active = False
         control = qos.control(self.get_parameter("real_time").value)
         publisher, subscription = self.create_lifecycle_publisher, self.create_subscription
@@ -65,7 +65,7 @@ class WbicNode(node.AerialNode):
         self._results = publisher(MotionResult, "motion_result", qos.EVENT)
         self._outputs = [self._commands, self._statuses, self._odometry, self._results]
         self._inputs = [
-            subscription(RobotState, "state", self._on_state, control),
+            subscription(RobotState, "state", self._on_state, control, raw=True),
             subscription(MotionPlan, "motion_plan", self._on_plan, qos.EVENT),
             subscription(MotionSelection, "motion_selection", self._on_selection, qos.EVENT),
         ]
@@ -131,18 +131,20 @@ class WbicNode(node.AerialNode):
 
     # --- the control loop --------------------------------------------------------------------------------------------
 
-    def _on_state(self, message: RobotState) -> None:
+    def _on_state(self, data: bytes) -> None:
         received = time.perf_counter()
         if not self._active:
             return
         self._heard = time.monotonic()
-        measurement = state_from_message(message)
-        if not _makes_sense(measurement, self._robot):
-            self.get_logger().error("a state is ignored: its fields do not fit the robot", throttle_duration_sec=1.0)
+        try:
+            measurement = self._state_wire.read(data)
+            _check_makes_sense(measurement)
+        except ValueError as error:
+            self.get_logger().error(f"a state is ignored: {error}", throttle_duration_sec=1.0)
             return
         if self._is_new(measurement):
             self._last = self._controller.step(measurement)
-        self._commands.publish(command_to_message(self._last, message.stamp))
+        self._commands.publish(self._command_wire.write(self._last))
         self._pace.tick_times.append(time.perf_counter() - received)
         self._publish(self._requests.finish())
         self._report(measurement)
@@ -217,16 +219,14 @@ class WbicNode(node.AerialNode):
         return response
 
 
-def _makes_sense(measurement: Measurement, robot: Robot) -> bool:
-    """Return whether a measurement has a finite number for every joint and a unit quaternion."""
-    joints = (measurement.joint_position, measurement.joint_velocity)
-    if any(row.shape != (robot.n_joints,) for row in joints):
-        return False
-    numbers = (*joints, measurement.orientation, measurement.angular_velocity, measurement.linear_acceleration)
-    return bool(
-        np.isfinite(np.concatenate(numbers)).all()
-        and abs(measurement.orientation @ measurement.orientation - 1.0) < QUATERNION_TOLERANCE
-    )
+def _check_makes_sense(measurement: Measurement) -> None:
+    """Raise ValueError unless a measurement's numbers are finite and its quaternion is a rotation."""
+    rows = (measurement.joint_position, measurement.joint_velocity)
+    vectors = (measurement.orientation, measurement.angular_velocity, measurement.linear_acceleration)
+    if not np.isfinite(np.concatenate((*rows, *vectors))).all():
+        raise ValueError("expected finite numbers, found others")
+    if abs(measurement.orientation @ measurement.orientation - 1.0) > QUATERNION_TOLERANCE:
+        raise ValueError(f"field orientation: expected a unit quaternion, found {measurement.orientation.tolist()}")
 
 
 def main() -> None:
