@@ -11,6 +11,7 @@ from scipy.optimize import nnls
 
 from aerial_model.contact import friction_pyramid
 from aerial_model.robot import BASE_TWIST
+from aerial_wbic import qp_solvers
 from aerial_wbic.gains import QpSolver
 from aerial_wbic.qp import ForceOptimization, Room, Solution
 from aerial_wbic.qp_solvers import SOLVERS
@@ -21,6 +22,7 @@ FORCE_TOLERANCE = 0.1  # that a force may leave the pyramid [N]
 GRADIENT_TOLERANCE = 0.03  # of the cost's gradient, relative to its largest part
 KKT_TOLERANCE = 1e-6  # of the independent optimum, relative to the cost's gradient
 OPTIMUM_TOLERANCE = 0.01  # between the solver's forces and the independent ones, relative to the largest
+REST_TOLERANCE = 1e-4  # of accelerations and forces, relative to the largest: directions that are hardly held
 ROOM_TOLERANCE = 0.5  # by which a torque may leave its room [N·m], or a force the pyramid on that account [N]
 ACTIVE = 0.3  # slack below which a face of the pyramid is taken to bear [N]
 
@@ -52,7 +54,41 @@ def test_the_base_obeys_the_equations_of_motion(optimization, state_at, seed, co
     vdot_cmd, f_cmd = problem(state, seed)
     solution = optimization.solve(state, vdot_cmd, f_cmd, contact)
     np.testing.assert_allclose(residual(state, solution), 0.0, atol=EQUATION_TOLERANCE)
-    np.testing.assert_array_equal(solution.vdot[6:], vdot_cmd[6:])
+
+
+def giving_way(state, contact):
+    """E of (3.24) from its definition: least kinetic energy of the joints, loaded points at rest, as a system of equations."""
+    J = state.J_contacts[contact].reshape(-1, len(state.v))
+    n = len(state.v) - 6
+    system = np.block([[state.M[6:, 6:], J[:, 6:].T], [J[:, 6:], np.zeros((len(J), len(J)))]])
+    right = np.vstack([np.zeros((n, 6)), -J[:, :6]])
+    return np.vstack([np.eye(6), np.linalg.lstsq(system, right, rcond=None)[0][:n]])
+
+
+@any_state
+@given(seed=st.integers(0, 10**6), contact=contacts)
+def test_joints_give_way_with_the_base_and_loaded_points_stay(optimization, state_at, seed, contact):
+    state = state_at(seed)
+    vdot_cmd, f_cmd = problem(state, seed)
+    change = optimization.solve(state, vdot_cmd, f_cmd, contact).vdot - vdot_cmd
+    size = np.abs(change).max()
+    np.testing.assert_allclose(change, giving_way(state, contact) @ change[:6], atol=REST_TOLERANCE * size)
+    np.testing.assert_allclose(state.J_contacts[contact] @ change, 0.0, atol=REST_TOLERANCE * size)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_its_torques_make_the_ground_give_its_forces(optimization, robot, state_at, seed):
+    """Forward dynamics with the feet held: nothing that was optimized differs from what then happens."""
+    state = state_at(seed)
+    contact = np.ones(4, dtype=bool)
+    solution = optimization.solve(state, *problem(state, seed), contact)
+    J = state.J_contacts.reshape(-1, len(state.v))
+    system = np.block([[state.M, -J.T], [J, np.zeros((len(J), len(J)))]])
+    right = np.concatenate([np.zeros(6), solution.torque, J @ problem(state, seed)[0]])
+    right[: len(state.v)] -= state.nle
+    happens = np.linalg.solve(system, right)
+    np.testing.assert_allclose(happens[: len(state.v)], solution.vdot, atol=REST_TOLERANCE * np.abs(happens).max())
+    np.testing.assert_allclose(happens[len(state.v) :], solution.force.ravel(), atol=REST_TOLERANCE * np.abs(happens).max())
 
 
 @any_state
@@ -74,7 +110,8 @@ def test_no_other_forces_cost_less(optimization, robot, gains, state_at, seed, c
     vdot_cmd, f_cmd = problem(state, seed)
     solution = optimization.solve(state, vdot_cmd, f_cmd, contact)
     base = (solution.vdot - vdot_cmd)[BASE_TWIST]
-    lift = np.linalg.solve(state.M[BASE_TWIST, BASE_TWIST], state.J_contacts[contact, :, BASE_TWIST].reshape(-1, 6).T)
+    H_E = state.M[BASE_TWIST] @ giving_way(state, contact)
+    lift = np.linalg.solve(H_E, state.J_contacts[contact, :, BASE_TWIST].reshape(-1, 6).T)
     change = (solution.force - f_cmd)[contact].ravel()
     parts = gains.weight_base * lift.T @ base, gains.weight_force * change
     W = np.kron(np.eye(contact.sum()), friction_pyramid(robot.friction_coefficient))
@@ -85,9 +122,9 @@ def test_no_other_forces_cost_less(optimization, robot, gains, state_at, seed, c
 
 def condensed(robot, gains, state, vdot_cmd, f_cmd, contact):
     """The program (3.24) in the loaded forces x alone, min ½ xᵀ H x + gᵀ x s.t. W x ≥ 0, from its formulas."""
-    H_bb = state.M[BASE_TWIST, BASE_TWIST]
-    lift = np.linalg.solve(H_bb, state.J_contacts[contact, :, BASE_TWIST].reshape(-1, 6).T)
-    missing = -np.linalg.solve(H_bb, (state.M @ vdot_cmd + state.nle)[BASE_TWIST])
+    H_E = state.M[BASE_TWIST] @ giving_way(state, contact)
+    lift = np.linalg.solve(H_E, state.J_contacts[contact, :, BASE_TWIST].reshape(-1, 6).T)
+    missing = -np.linalg.solve(H_E, (state.M @ vdot_cmd + state.nle)[BASE_TWIST])
     planned = f_cmd[contact].ravel()
     H = gains.weight_base * lift.T @ lift + gains.weight_force * np.eye(len(planned))
     g = gains.weight_base * lift.T @ missing - gains.weight_force * planned
@@ -163,8 +200,10 @@ def test_a_failed_solve_falls_back_and_the_next_one_works(optimization, state_at
     np.testing.assert_allclose(again.force, good.force, atol=0.1)
 
 
-def test_the_fallback_keeps_the_pyramid_and_the_equations_of_motion(optimization, robot, state_at, monkeypatch):
-    monkeypatch.setattr("aerial_wbic.qp._Program.solve", lambda *_: None)
+@pytest.mark.parametrize("name", ["Osqp", "Daqp"])
+def test_the_fallback_keeps_the_pyramid_and_the_equations_of_motion(robot, gains, state_at, monkeypatch, name):
+    monkeypatch.setattr(f"aerial_wbic.qp_solvers.{name}.minimum", lambda *_: None)
+    optimization = ForceOptimization(robot, gains.weight_base, gains.weight_force, getattr(qp_solvers, name))
     state = state_at(2)
     vdot_cmd, f_cmd = problem(state, 2)
     solution = optimization.solve(state, vdot_cmd, f_cmd, np.ones(4, dtype=bool))

@@ -15,9 +15,11 @@ MOMENT_TOLERANCE = 0.05  # [N·m]
 
 
 @pytest.fixture
-def hold_of(gains):
+def hold_of(gains, robot):
+    pose = robot.poses["home"]
+
     def hold_of(state, height=0.25):
-        return Hold(state, 2.0, rate=10.0, com_height=height, depth=0.1, turn=0.4, gains=gains.hold)
+        return Hold(state, 2.0, rate=10.0, com_height=height, depth=0.1, turn=0.4, pose=pose, gains=gains.hold)
 
     return hold_of
 

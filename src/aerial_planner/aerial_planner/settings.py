@@ -10,6 +10,7 @@ from typing import Any
 
 from aerial_model.scale import Scale, Unit
 
+CONTROL_PERIOD = 0.002  # [s] for which a controller holds its torques: contacts that end within one push too long
 _UNITS = {
     "dt": Unit(time=1),
     "force_max": Unit(mass=1, length=1, time=-2),
@@ -72,4 +73,6 @@ class PlannerSettings:
     @staticmethod
     def defaults(scale: Scale) -> dict[str, Any]:
         """Return what a ``robot.yaml`` need not say: the numbers above, scaled."""
-        return scale.applied(asdict(PlannerSettings()), _UNITS)
+        numbers = scale.applied(asdict(PlannerSettings()), _UNITS)
+        numbers["dt"] = max(1, round(numbers["dt"] / CONTROL_PERIOD)) * CONTROL_PERIOD
+        return numbers

@@ -49,9 +49,13 @@ class BodyGains(NamedTuple):
 
 
 class TaskOrder(StrEnum):
-    """Which tasks the accelerations come from: in strict priority, or all at once with weights."""
+    """Which tasks the accelerations come from: in strict priority, or all at once with weights.
 
-    WBC_A = "wbc_a"  # limbs, base, angular momentum
+    Where a leg has joints to spare, they follow the plan below the base. Without spare joints and arms WBC_A and WBC_C are
+    the same: limbs and base leave nothing to what is below them.
+    """
+
+    WBC_A = "wbc_a"  # limbs, base, angular momentum: the thesis's
     WBC_B = "wbc_b"  # limbs, momentum
     WBC_C = "wbc_c"  # limbs, base, joint positions
     WEIGHTED = "weighted"  # those of WBC_A, in one least-squares problem
@@ -125,7 +129,7 @@ class ControllerGains:
     start_tilt_tolerance: float  # between a plan's first base attitude and the estimated one [rad]
     start_speed_tolerance: float  # of the centre of mass when a plan is accepted [m/s]
     estimator: EstimatorNoise
-    tasks: TaskOrder = TaskOrder.WBC_A
+    tasks: TaskOrder = TaskOrder.WBC_C
     task_weights: TaskWeights = field(default=TaskWeights())
     qp_solver: QpSolver = QpSolver.OSQP
     touchdown: Touchdown = Touchdown.TIME

@@ -209,6 +209,7 @@ class Phases:
             com_height=com_height - self._foot_radius,
             depth=self._gains.landing_depth,
             turn=self._gains.landing_turn,
+            pose=self._robot.poses["home"],
             gains=self._gains.hold,
         )
 

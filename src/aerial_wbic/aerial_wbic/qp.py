@@ -1,11 +1,16 @@
 """Reaction forces that the ground can give and the base acceleration that follows from them, thesis (3.24).
 
     min δ_qᵀ Q_1 δ_q + δ_fᵀ Q_2 δ_f
-    s.t. S_fb (H q̈ + C q̇ + G) = S_fb J_cᵀ f_r,   q̈ = q̈_cmd + [δ_q; 0],   f_r = f_cmd + δ_f,   W f_r ≥ 0.
+    s.t. S_fb (H q̈ + C q̇ + G) = S_fb J_cᵀ f_r,   q̈ = q̈_cmd + E δ_q,   f_r = f_cmd + δ_f,   W f_r ≥ 0.
+
+In the thesis E = [1; 0]: the base gives way, the joints accelerate as commanded, and feet that the ground holds would have
+to slip. Here the joints give way with the base: E δ_q is the motion with that acceleration of the base in which loaded
+points stay where they are, and of these the one of least kinetic energy of the joints. The forces are then those that the
+ground really gives, and the torques those that go with them.
 
 A solver is set up once for every number of loaded points; the sparsity never changes, a tick updates numbers. The problem
 is scaled, as a fixed penalty needs it to converge: the variables are √Q_1 δ_q and √Q_2 δ_f, and the rows of the equations
-of motion are multiplied by √Q_1 H_bb⁻¹, so that cost and equality are both of unit size.
+of motion are multiplied by √Q_1 (S_fb H E)⁻¹, so that cost and equality are both of unit size.
 """
 
 from __future__ import annotations
@@ -21,13 +26,14 @@ from aerial_model.kinematics import Configuration
 from aerial_model.robot import BASE_TWIST, JOINT_VELOCITY, Robot
 from aerial_wbic.qp_solvers import INFINITY, N_BASE, Osqp, QpFactory
 
+_HELD = 1e-6  # [1/kg] below it no joint holds a direction of a point: straight legs, points of one foot
 _LEVER = 0.2  # [m] by which torques are divided, so that their rows are as large as those of forces
 
 
 class Solution(NamedTuple):
     """Acceleration, forces and torques that obey the equations of motion."""
 
-    vdot: np.ndarray  # (nv,) base as physics has it, joints as commanded
+    vdot: np.ndarray  # (nv,) as physics has it
     force: np.ndarray  # f_r (n_c, 3) in W [N]; zero where no load is planned
     torque: np.ndarray  # of the joints (n,) [N·m], thesis (2.2)
     solved: bool  # False: the fallback's forces
@@ -38,6 +44,13 @@ class Room(NamedTuple):
 
     least: np.ndarray  # (n,) [N·m]
     greatest: np.ndarray  # (n,) [N·m]
+
+
+class GiveWay(NamedTuple):
+    """How the robot gives way where the commanded accelerations and the forces do not fit."""
+
+    E: np.ndarray  # (nv, 6) accelerations with that of the base, loaded points at rest
+    inverse: np.ndarray  # (S_fb H E)⁻¹ (6, 6): the base's acceleration for a wrench that is missing
 
 
 class ForceOptimization:
@@ -57,6 +70,8 @@ class ForceOptimization:
         self._limited = [_Program(n, robot.n_joints, pyramid, weight_base, weight_force, solver) for n in numbers]
         self._friction = float(pyramid[0, 2])
         self._root_force = float(np.sqrt(weight_force))
+        # Of this tick; written in place.
+        self._give = GiveWay(np.zeros((robot.model.nv, N_BASE)), np.zeros((N_BASE, N_BASE)))
 
     def solve(self, state: Configuration, vdot_cmd: np.ndarray, f_cmd: np.ndarray, contact: np.ndarray) -> Solution:
         """Return the forces and the acceleration of (3.24).
@@ -70,7 +85,7 @@ class ForceOptimization:
             contact: points that carry load ``(n_c,)`` bool.
         """
         n = np.count_nonzero(contact)
-        df = self._programs[n - 1].solve(state, vdot_cmd, f_cmd, contact) if n else _NO_FORCE
+        df = self._programs[n - 1].solve(state, vdot_cmd, f_cmd, contact, self._give) if n else _NO_FORCE
         return self._solution(state, vdot_cmd, f_cmd, contact, df)
 
     def within(
@@ -87,7 +102,8 @@ class ForceOptimization:
         Limits are those of the limbs that bear load, one at least; what no force on them could keep is not asked for. The
         rest as for ``solve``.
         """
-        df = self._limited[np.count_nonzero(contact) - 1].solve(state, vdot_cmd, f_cmd, contact, room)
+        program = self._limited[np.count_nonzero(contact) - 1]
+        df = program.solve(state, vdot_cmd, f_cmd, contact, self._give, room)
         limited = self._solution(state, vdot_cmd, f_cmd, contact, df)
         return limited._replace(solved=solution.solved) if limited.solved else solution
 
@@ -96,8 +112,10 @@ class ForceOptimization:
     ) -> Solution:
         """Return what follows from the optimum; with None, or what is not finite, the fallback."""
         found = _NO_FORCE if df is None else df
-        outcome = _outcome(state, vdot_cmd, f_cmd, contact, found, df is not None, self._root_force, self._friction)
-        return Solution(*outcome)
+        solved = df is not None
+        return Solution(
+            *_outcome(state, vdot_cmd, f_cmd, contact, self._give, found, solved, self._root_force, self._friction)
+        )
 
 
 _NO_FORCE = np.zeros(0)
@@ -136,16 +154,19 @@ class _Program:
         vdot_cmd: np.ndarray,
         f_cmd: np.ndarray,
         contact: np.ndarray,
+        give: GiveWay,
         room: Room | None = None,
     ) -> np.ndarray | None:
         """Return √Q_2 δ_f ``(3 n,)`` of the loaded points, or None; ``room`` for one with limits, the rest as of the whole."""
         root_base, root_force = self._root_base, self._root_force
         A, lower, upper = self._A.data, self._lower, self._upper
         _state_problem(
-            state, vdot_cmd, f_cmd, contact, self._pyramid, root_base, root_force, self._changing, A, lower, upper
+            state, vdot_cmd, f_cmd, contact, give, self._pyramid, root_base, root_force, self._changing, A, lower, upper
         )
         if room is not None:
-            _state_limits(state, vdot_cmd, f_cmd, contact, room, root_base, root_force, self._limits, A, lower, upper)
+            _state_limits(
+                state, vdot_cmd, f_cmd, contact, give, room, root_base, root_force, self._limits, A, lower, upper
+            )
         return self._solver.minimum(self._A, lower, upper)
 
 
@@ -155,6 +176,7 @@ def _state_problem(
     vdot_cmd: np.ndarray,
     f_cmd: np.ndarray,
     contact: np.ndarray,
+    give: GiveWay,
     pyramid: np.ndarray,
     root_base: float,
     root_force: float,
@@ -163,16 +185,17 @@ def _state_problem(
     lower: np.ndarray,
     upper: np.ndarray,
 ) -> None:
-    """Write this tick's numbers into the entries ``changing`` ``(3 n, 6)`` of A and into the bounds.
+    """Write this tick's numbers into the entries ``changing`` ``(3 n, 6)`` of A, into the bounds and into ``give``.
 
-    The rows of the equations of motion say √Q_1 δ_q = √Q_1 H_bb⁻¹ (S_fb J_cᵀ δ_f + what f_cmd leaves missing).
+    The rows of the equations of motion say √Q_1 δ_q = √Q_1 (S_fb H E)⁻¹ (S_fb J_cᵀ δ_f + what f_cmd leaves missing).
     """
+    give_way(state, contact, give)
     loaded = np.flatnonzero(contact)
     columns = np.empty((N_BASE, 3 * len(loaded) + 1))
     for n, i in enumerate(loaded):
         columns[:, 3 * n : 3 * n + 3] = state.J_contacts[i, :, :N_BASE].T
     columns[:, -1] = _missing(state, vdot_cmd, f_cmd, contact)
-    _solve_base(state, columns)
+    columns = give.inverse @ columns
     for column in range(len(changing)):
         for row in range(N_BASE):
             A[changing[column, row]] = -root_base / root_force * columns[row, column]
@@ -189,6 +212,7 @@ def _state_limits(
     vdot_cmd: np.ndarray,
     f_cmd: np.ndarray,
     contact: np.ndarray,
+    give: GiveWay,
     room: Room,
     root_base: float,
     root_force: float,
@@ -199,15 +223,14 @@ def _state_limits(
 ) -> None:
     """Write the rows of the torques into the entries ``limits`` ``(6 + 3 n, n)`` of A and into the bounds.
 
-    They say least ≤ τ_cmd + H_jb δ_q − J_jᵀ δ_f ≤ greatest, the bounds moved apart to admit the torques without force.
+    They say least ≤ τ_cmd + H_j E δ_q − J_jᵀ δ_f ≤ greatest, the bounds moved apart to admit the torques without force.
     """
     loaded = np.flatnonzero(contact)
     n_joints = limits.shape[1]
     begin = len(lower) - n_joints
     force = np.zeros_like(f_cmd)
-    free = np.empty((N_BASE, 1))
-    free[:, 0] = _missing(state, vdot_cmd, force, contact)
-    _solve_base(state, free)
+    H_E = state.M @ give.E
+    free = give.inverse @ _missing(state, vdot_cmd, force, contact)
     for i in loaded:
         force[i] = f_cmd[i]
     torque_cmd = _inverse_dynamics(state, vdot_cmd, force)
@@ -215,8 +238,8 @@ def _state_limits(
         row = JOINT_VELOCITY.start + j
         without = state.M[row] @ vdot_cmd + state.nle[row]
         for c in range(N_BASE):
-            A[limits[c, j]] = state.M[row, c] / (_LEVER * root_base)
-            without += state.M[row, c] * free[c, 0]
+            A[limits[c, j]] = H_E[row, c] / (_LEVER * root_base)
+            without += H_E[row, c] * free[c]
         bears = False
         for n, i in enumerate(loaded):
             for k in range(3):
@@ -246,6 +269,7 @@ def _outcome(
     vdot_cmd: np.ndarray,
     f_cmd: np.ndarray,
     contact: np.ndarray,
+    give: GiveWay,
     df: np.ndarray,
     solved: bool,
     root_force: float,
@@ -253,7 +277,7 @@ def _outcome(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
     """Return q̈ ``(nv,)``, f_r ``(n_c, 3)``, τ ``(n,)``, and whether they follow from √Q_2 δ_f, which is ``df``.
 
-    The base's part of q̈ follows from the forces: the equations of motion hold to rounding.
+    How the robot gives way follows from the forces: the equations of motion hold to rounding.
     """
     force = np.zeros_like(f_cmd)
     for k in range(len(df)):
@@ -267,20 +291,41 @@ def _outcome(
             force[i, 0] = min(max(f_cmd[i, 0], -side), side)
             force[i, 1] = min(max(f_cmd[i, 1], -side), side)
             force[i, 2] = normal
-    change = np.empty((N_BASE, 1))
-    change[:, 0] = _missing(state, vdot_cmd, force, contact)
-    _solve_base(state, change)
-    vdot = vdot_cmd.copy()
-    vdot[BASE_TWIST] += change[:, 0]
+    if not contact.any():
+        give_way(state, contact, give)
+    vdot = vdot_cmd + give.E @ (give.inverse @ _missing(state, vdot_cmd, force, contact))
     return vdot, force, _inverse_dynamics(state, vdot, force), solved
 
 
 @compiled
-def _solve_base(state: Configuration, columns: np.ndarray) -> None:
-    """Replace columns ``(6, k)`` by H_bb⁻¹ times them."""
-    L = np.empty((N_BASE, N_BASE))
-    cholesky(state.M[BASE_TWIST, BASE_TWIST], L)
-    cholesky_solve(L, columns)
+def give_way(state: Configuration, contact: np.ndarray, give: GiveWay) -> None:
+    """Write how the robot gives way while the points of ``contact`` ``(n_c,)`` bool stay at rest.
+
+    The joints' part of E is −H_jj⁻¹ J_jᵀ (J_j H_jj⁻¹ J_jᵀ)⁻¹ J_b; without contact it is zero.
+    """
+    E = give.E
+    E[:] = 0.0
+    for k in range(N_BASE):
+        E[k, k] = 1.0
+    loaded = np.flatnonzero(contact)
+    if len(loaded) > 0:
+        rows, n = 3 * len(loaded), len(E) - N_BASE
+        J_b, J_j = np.empty((rows, N_BASE)), np.empty((rows, n))
+        for i, point in enumerate(loaded):
+            J_b[3 * i : 3 * i + 3] = state.J_contacts[point, :, BASE_TWIST]
+            J_j[3 * i : 3 * i + 3] = state.J_contacts[point, :, JOINT_VELOCITY]
+        L = np.empty((n, n))
+        cholesky(state.M[JOINT_VELOCITY, JOINT_VELOCITY], L)
+        moved = np.ascontiguousarray(J_j.T)
+        cholesky_solve(L, moved)
+        A = J_j @ moved
+        for k in range(rows):
+            A[k, k] += _HELD
+        L = np.empty_like(A)
+        cholesky(A, L)
+        cholesky_solve(L, J_b)
+        E[JOINT_VELOCITY] = -(moved @ J_b)
+    give.inverse[:] = np.linalg.inv(np.ascontiguousarray(state.M[BASE_TWIST]) @ E)
 
 
 @compiled

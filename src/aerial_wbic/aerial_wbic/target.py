@@ -101,7 +101,7 @@ class Hold:
 
     All contact points are taken to be on the ground. The way to rest is one of the centre of mass *relative to the
     centre of its support* and of the attitude, from how the robot moves at the beginning: neither an early nor a late
-    touchdown makes the error jump. A fall is caught within a given depth, and forward speed as fast: only while the feet
+    touchdown makes the error jump. Joints that are free to do so go to a pose. A fall is caught within a given depth, and forward speed as fast: only while the feet
     bear that load do friction and the length of the support let them. A rotation is caught within a given angle.
 
     Args:
@@ -111,6 +111,7 @@ class Hold:
         com_height: of the centre of mass above the centre of the contact spheres, at rest [m].
         depth: to which a fall is caught [m].
         turn: to which a rotation is caught [rad].
+        pose: joint positions ``(n,)`` to go to, as far as contacts and body leave them free [rad].
         gains: of the base task.
     """
 
@@ -123,6 +124,7 @@ class Hold:
         com_height: float,
         depth: float,
         turn: float,
+        pose: np.ndarray,
         gains: BodyGains,
     ) -> None:
         velocity = state.com_velocity
@@ -137,6 +139,7 @@ class Hold:
             offset=settling(offset, velocity, self._rest, max(rate, REACH * abs(velocity[2]) / depth)),
             tilt=settling(tilt, spin, np.zeros(3), max(rate, REACH * float(np.linalg.norm(spin)) / turn)),
             level=level,
+            joints=settling(state.q[JOINT_POSITION], state.v[JOINT_VELOCITY], pose, rate),
         )
         self._target = _resting(len(state.v) - JOINT_VELOCITY.start, len(state.contact_positions), gains)
         self.end = time + TIME / rate
@@ -152,12 +155,13 @@ class Hold:
 
 
 class _Course(NamedTuple):
-    """The way to rest: of the centre of mass from the centre of the support, and of the attitude from ``level``."""
+    """The way to rest: of the centre of mass from the centre of the support, of the attitude from ``level``, of the joints."""
 
     begin: float  # [s]
     offset: Settling  # [m]
     tilt: Settling  # rotation vector in W [rad]
     level: np.ndarray  # (4,)
+    joints: Settling  # [rad]
 
 
 def _resting(n: int, n_c: int, gains: BodyGains) -> WholeBodyTarget:
@@ -187,7 +191,9 @@ def _held(course: _Course, time: float, state: Configuration, target: WholeBodyT
     turning = attitude.damping * (body.angular_velocity - omega) + attitude.stiffness * turn
     target.angular_momentum[:] = inertia @ omega
     target.angular_momentum_rate[:] = inertia @ (body.angular_acceleration + turning)
-    target.joint_position[:] = state.q[JOINT_POSITION]
+    target.joint_position[:], target.joint_velocity[:], target.joint_acceleration[:] = settled(
+        course.joints, time - course.begin
+    )
     target.force[:] = shared_load(state, total)
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aerial_model.compiled import compiled, inverse_of, log_of, product_of, quaternion
+from aerial_model.compiled import cholesky, cholesky_solve, compiled, inverse_of, log_of, product_of, quaternion
 from aerial_model.kinematics import Configuration
 from aerial_model.robot import BASE_ANGULAR, BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY, Robot
 from aerial_wbic.gains import ControllerGains, Feedback, TaskOrder
@@ -21,6 +21,8 @@ from aerial_wbic.target import BodyTarget, WholeBodyTarget
 ANGULAR = slice(0, 3)  # rows of A_G and of momenta, thesis (2.5)
 LINEAR = slice(3, 6)
 
+_SWIVEL = 1e-9  # [m²] of J Jᵀ, below which joints do not move a point
+
 
 class Joints(NamedTuple):
     """What tasks lead: it depends on which points carry load."""
@@ -28,6 +30,7 @@ class Joints(NamedTuple):
     rank: np.ndarray  # (n_c,) how many velocities of a loaded point the points before it on its link leave open; else 0
     mate: np.ndarray  # (n_c, 2) the first two loaded points on its link
     swinging: np.ndarray  # (n_s,) of limbs in the air
+    spare: np.ndarray  # (n_r,) of limbs with load and more joints than their points hold
     posed: np.ndarray  # (n_p,) that a posture is asked of: arms, or all that do not swing when there are none
 
 
@@ -56,7 +59,13 @@ class Limbs:
                 fellows = np.flatnonzero(contact & (self._links == self._links[i]))
                 rank[i] = max(0, 3 - int(np.flatnonzero(fellows == i)[0]))
                 mate[i] = fellows[:2] if len(fellows) > 1 else i
-            self._joints[key] = Joints(rank, mate, np.flatnonzero(swinging), np.flatnonzero(posed))
+            spare = np.zeros(self._chains.shape[1], dtype=bool)
+            for link in np.unique(self._links[contact]):
+                fellows = contact & (self._links == link)
+                chain = self._chains[fellows].any(axis=0)
+                spare |= chain & (np.count_nonzero(chain) > rank[fellows].sum())
+            each = (np.flatnonzero(joints) for joints in (swinging, spare, posed))
+            self._joints[key] = Joints(rank, mate, *each)
         return self._joints[key]
 
 
@@ -69,12 +78,13 @@ class Statement(IntEnum):
     ANGULAR_MOMENTUM = 3
     MOMENTUM = 4
     POSTURE = 5
+    SPARE_JOINTS = 6
 
 
 class Arrangement(NamedTuple):
     """Which tasks the accelerations come from. Of all arrangements the type is the same: one compiled tick serves all."""
 
-    order: tuple[int, int, int]  # of Statement, the most important first
+    order: tuple[int, int, int, int]  # of Statement, the most important first
     weights: np.ndarray  # (3,) of the tasks in one least-squares problem, or (0,) for strict priority
     limbs: Feedback  # gains of joints that are led
     angular_momentum_damping: float  # [1/s]
@@ -92,10 +102,10 @@ class Arrangement(NamedTuple):
 
 
 _ORDERS = {
-    TaskOrder.WBC_A: (Statement.LIMBS, Statement.BASE, Statement.ANGULAR_MOMENTUM),
-    TaskOrder.WBC_B: (Statement.LIMBS, Statement.MOMENTUM, Statement.NOTHING),
-    TaskOrder.WBC_C: (Statement.LIMBS, Statement.BASE, Statement.POSTURE),
-    TaskOrder.WEIGHTED: (Statement.LIMBS, Statement.BASE, Statement.ANGULAR_MOMENTUM),
+    TaskOrder.WBC_A: (Statement.LIMBS, Statement.BASE, Statement.SPARE_JOINTS, Statement.ANGULAR_MOMENTUM),
+    TaskOrder.WBC_B: (Statement.LIMBS, Statement.MOMENTUM, Statement.SPARE_JOINTS, Statement.NOTHING),
+    TaskOrder.WBC_C: (Statement.LIMBS, Statement.BASE, Statement.SPARE_JOINTS, Statement.POSTURE),
+    TaskOrder.WEIGHTED: (Statement.LIMBS, Statement.BASE, Statement.SPARE_JOINTS, Statement.ANGULAR_MOMENTUM),
 }
 
 
@@ -113,13 +123,14 @@ def command(
 @compiled
 def arranged_tasks(
     state: Configuration, target: WholeBodyTarget, joints: Joints, arrangement: Arrangement
-) -> tuple[Task, Task, Task]:
+) -> tuple[Task, Task, Task, Task]:
     """Return the controller's tasks at ``state``, most important first."""
-    first, second, third = arrangement.order
+    first, second, third, fourth = arrangement.order
     return (
         _task(first, state, target, joints, arrangement),
         _task(second, state, target, joints, arrangement),
         _task(third, state, target, joints, arrangement),
+        _task(fourth, state, target, joints, arrangement),
     )
 
 
@@ -135,6 +146,8 @@ def _task(
         return angular_momentum_task(state, target, arrangement.angular_momentum_damping)
     if statement == Statement.MOMENTUM:
         return momentum_task(state, target, arrangement.angular_momentum_damping)
+    if statement == Statement.SPARE_JOINTS:
+        return spare_joint_task(state, target, joints, arrangement.limbs)
     if statement == Statement.POSTURE:
         return posture_task(state, target, joints.posed, arrangement.limbs)
     return Task(np.zeros((0, len(state.v))), np.zeros(0), np.zeros(0))
@@ -199,6 +212,32 @@ def posture_task(state: Configuration, target: WholeBodyTarget, joints: np.ndarr
     task = Task(np.zeros((len(joints), len(state.v))), np.zeros(len(joints)), np.zeros(len(joints)))
     _lead(state, target, joints, feedback, task)
     return task
+
+
+@compiled
+def spare_joint_task(state: Configuration, target: WholeBodyTarget, joints: Joints, feedback: Feedback) -> Task:
+    """Return the task that limbs with load follow the plan where neither base nor contact points say how they are to move.
+
+    A leg that stands on its toes with more than three joints can swivel: its joints' motions are projected on those that
+    leave its points at rest relative to the base.
+    """
+    task = posture_task(state, target, joints.spare, feedback)
+    if len(joints.spare) == 0:
+        return task
+    loaded = np.flatnonzero(target.contact)
+    J = np.empty((3 * len(loaded), len(joints.spare)))
+    for i, point in enumerate(loaded):
+        for column, j in enumerate(joints.spare):
+            J[3 * i : 3 * i + 3, column] = state.J_contacts[point, :, JOINT_VELOCITY.start + j]
+    A = J @ J.T
+    for k in range(len(A)):
+        A[k, k] += _SWIVEL
+    L = np.empty_like(A)
+    cholesky(A, L)
+    held = J.copy()
+    cholesky_solve(L, held)
+    P = np.eye(len(joints.spare)) - J.T @ held
+    return Task(P @ task.J, P @ task.a, P @ task.xdot)
 
 
 @compiled

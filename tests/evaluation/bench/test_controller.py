@@ -15,7 +15,7 @@ FORCE_TOLERANCE = 2.0  # between forces of two solvers [N]
 @pytest.fixture(scope="module")
 def rows():
     subject = Subject(robot=Robot.load("mini_cheetah"), motions=("jump",), repeats=1)
-    return list(measured(subject, tuple(SECTIONS), SECTIONS))
+    return list(measured(subject, ("ticks", "solvers"), SECTIONS))  # TSID has an environment of its own
 
 
 def of(rows, section):
@@ -24,7 +24,7 @@ def of(rows, section):
 
 def test_every_solver_and_every_order_of_tasks_is_timed(rows):
     timed = {(row["tasks"], row["qp_solver"]) for row in of(rows, "ticks")}
-    assert timed == {("wbc_a", solver) for solver in QpSolver} | {(order, "osqp") for order in TaskOrder}
+    assert timed == {("wbc_c", solver) for solver in QpSolver} | {(order, "osqp") for order in TaskOrder}
 
 
 def test_the_parts_make_up_the_tick(rows):

@@ -21,7 +21,7 @@ from aerial_model.robot import Robot
 from aerial_model.state import Command, Measurement
 from aerial_sim.simulation import Simulation
 from aerial_wbic.controller import Controller
-from aerial_wbic.gains import QpSolver, TaskOrder
+from aerial_wbic.gains import ControllerGains, QpSolver, TaskOrder
 
 PARTS = ("estimate", "kinematics", "target", "hierarchy", "qp", "torque")
 MICRO = 1e6  # microseconds in a second
@@ -118,8 +118,9 @@ def ticks(subject: Subject) -> list[Row]:
 
     All answer the measurements of the same closed loop and take turns; the first replay, not counted, warms caches up.
     """
-    choices = [(TaskOrder.WBC_A, solver) for solver in QpSolver]
-    choices += [(order, QpSolver.OSQP) for order in TaskOrder if order is not TaskOrder.WBC_A]
+    usual = subject.robot.section("controller", ControllerGains).tasks
+    choices = [(usual, solver) for solver in QpSolver]
+    choices += [(order, QpSolver.OSQP) for order in TaskOrder if order is not usual]
     robots = [subject.robot.with_section("controller", tasks=order, qp_solver=solver) for order, solver in choices]
     controllers = [Controller(robot) for robot in robots]
     rows = []
