@@ -88,7 +88,9 @@ def test_its_torques_make_the_ground_give_its_forces(optimization, robot, state_
     right[: len(state.v)] -= state.nle
     happens = np.linalg.solve(system, right)
     np.testing.assert_allclose(happens[: len(state.v)], solution.vdot, atol=REST_TOLERANCE * np.abs(happens).max())
-    np.testing.assert_allclose(happens[len(state.v) :], solution.force.ravel(), atol=REST_TOLERANCE * np.abs(happens).max())
+    np.testing.assert_allclose(
+        happens[len(state.v) :], solution.force.ravel(), atol=REST_TOLERANCE * np.abs(happens).max()
+    )
 
 
 @any_state

@@ -111,11 +111,7 @@ def body_reference(
     velocity = (landing_com - lift_off) / T + [0.0, 0.0, 0.5 * GRAVITY * T]
     R_landing = rotation.matrix(schedule.landing_orientation)
     way, fall = landing_com - lift_off, 0.5 * GRAVITY * T - (landing_com - lift_off)[2] / T
-    standing = landing_feet @ R_landing.T
-    lead = _landing_lead(standing, height, way, fall, schedule, settings)
-    inertia = R_landing @ np.asarray(model.inertia(robot.poses["landing"])) @ R_landing.T
-    spin = (1 - schedule.rotation_at_lift_off) / T * inertia @ schedule.rotation
-    lead += _turning_lead(standing, height, spin / (robot.mass * fall))
+    lead = _landing_lead(landing_feet @ R_landing.T, height, way, fall, schedule, settings)
     turning, ready = _turning_knots(schedule.flight_knots)
     share = 1 - ready / schedule.flight_knots  # of the flight, in which the feet are drawn up
     landing = _landing(landing_feet + lead @ R_landing, height, fall, T, share, robot, model, ik)
@@ -184,22 +180,6 @@ def _landing_lead(
     little = settings.landing_lead * distance / T
     far = stopping * distance / (T + _PUSHED * schedule.take_off_time + stopping)
     return (little + _shortness(feet, height, direction) * max(far - little, 0.0)) * direction
-
-
-def _turning_lead(feet: np.ndarray, height: float, spin: np.ndarray) -> np.ndarray:
-    """Return how far ``(3,)`` [m] the support is set aside so that the force that stops the fall stops a rotation, too.
-
-    A force F that acts ℓ aside turns the body with ℓ × F: with the impulse m w upwards, ℓ = α × e_z / (m w). A support
-    that is long in that direction does it by how its points share the force.
-
-    Args:
-        feet: ``(n_c, 3)`` [m] from the centre of mass, in S.
-        height: of the centre of mass [m].
-        spin: α / (m w) of the flight ``(3,)`` [m].
-    """
-    lead = np.cross(spin, [0.0, 0.0, 1.0])
-    length = float(np.linalg.norm(lead))
-    return lead * _shortness(feet, height, lead / length) if length > _NEARBY else np.zeros(3)
 
 
 def _shortness(feet: np.ndarray, height: float, direction: np.ndarray) -> float:
