@@ -116,3 +116,10 @@ def test_a_command_that_is_no_number_is_named():
     command = dataclasses.replace(command_of(robot), damping=np.full(robot.n_joints, np.nan))
     with pytest.raises(ValueError, match="damping: expected finite numbers, found"):
         CommandWire(robot).read(CommandWire(robot).write(command))
+
+
+def test_bytes_that_hold_no_message_are_said_to_hold_none():
+    robot = Robot.load("mini_cheetah")
+    data = CommandWire(robot).write(command_of(robot))
+    with pytest.raises(ValueError, match="expected a JointCommand, found 100 bytes that hold none"):
+        CommandWire(robot).read(data[:100])

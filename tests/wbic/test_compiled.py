@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aerial_model.compiled import cholesky, cholesky_solve
+from aerial_model.compiled import cholesky, cholesky_solve, invert
 from aerial_model.plan_file import save_plan
 
 ROUNDING = 1e-10
@@ -33,6 +33,21 @@ def test_factor_and_solution_are_numpys(m):
 def test_a_matrix_that_is_not_positive_is_told_by_its_pivot():
     A = np.diag([1.0, -2.0, 3.0])
     assert cholesky(A, np.zeros((3, 3))) == -2.0
+
+
+@pytest.mark.parametrize("m", [1, 3, 6])
+def test_the_inverse_is_numpys(m):
+    A = np.random.default_rng(m).normal(size=(m, m))[::-1].copy()
+    X = np.zeros((m, m))
+    invert(A, X)
+    np.testing.assert_allclose(X, np.linalg.inv(A), rtol=1e-9)
+
+
+@pytest.mark.parametrize("A", [np.zeros((3, 3)), np.full((3, 3), np.nan), np.ones((3, 3))])
+def test_without_an_inverse_nothing_is_raised_and_nothing_finite_claimed(A):
+    X = np.zeros((3, 3))
+    invert(A, X)
+    assert not np.isfinite(X).all()
 
 
 def test_no_tick_compiles_anything(hop, tmp_path):

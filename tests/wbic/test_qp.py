@@ -202,6 +202,14 @@ def test_a_failed_solve_falls_back_and_the_next_one_works(optimization, state_at
     np.testing.assert_allclose(again.force, good.force, atol=0.1)
 
 
+def test_a_state_that_is_no_number_raises_nothing(optimization, state_at):
+    """The drive then only damps."""
+    state = state_at(1)
+    broken = state._replace(M=np.full_like(state.M, np.nan))
+    solution = optimization.solve(broken, *problem(state, 1), np.ones(4, dtype=bool))
+    assert not np.isfinite(solution.torque).any()
+
+
 @pytest.mark.parametrize("name", ["Osqp", "Daqp"])
 def test_the_fallback_keeps_the_pyramid_and_the_equations_of_motion(robot, gains, state_at, monkeypatch, name):
     monkeypatch.setattr(f"aerial_wbic.qp_solvers.{name}.minimum", lambda *_: None)

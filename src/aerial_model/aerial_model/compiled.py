@@ -78,3 +78,29 @@ def cholesky_solve(L: np.ndarray, B: np.ndarray) -> None:
                 B[i, c] -= L[j, i] * B[j, c]
         for c in range(k):
             B[i, c] /= L[i, i]
+
+
+@compiled
+def invert(A: np.ndarray, X: np.ndarray) -> None:
+    """Write the inverse of a matrix ``(m, m)`` into X; of a singular one, or one that is not finite, what is not finite.
+
+    It is what NumPy's would be, but for that one raising an exception, which a tick must not.
+    """
+    m = len(A)
+    B = A.copy()
+    X[:] = np.eye(m)
+    for k in range(m):
+        pivot = k + np.argmax(np.abs(B[k:, k]))
+        for c in range(m):
+            B[k, c], B[pivot, c] = B[pivot, c], B[k, c]
+            X[k, c], X[pivot, c] = X[pivot, c], X[k, c]
+        scale = 1.0 / B[k, k]
+        for c in range(m):
+            B[k, c] *= scale
+            X[k, c] *= scale
+        for r in range(m):
+            if r != k:
+                factor = B[r, k]
+                for c in range(m):
+                    B[r, c] -= factor * B[k, c]
+                    X[r, c] -= factor * X[k, c]

@@ -110,8 +110,8 @@ def body_reference(
     lift_off = com_0 + [0.0, 0.0, _LIFT_OFF_RISE * height]
     velocity = (landing_com - lift_off) / T + [0.0, 0.0, 0.5 * GRAVITY * T]
     R_landing = rotation.matrix(schedule.landing_orientation)
-    way, fall = landing_com - lift_off, 0.5 * GRAVITY * T - (landing_com - lift_off)[2] / T
-    lead = _landing_lead(landing_feet @ R_landing.T, height, way, fall, schedule, settings)
+    lead = _landing_lead(landing_feet @ R_landing.T, height, landing_com - lift_off, schedule, settings)
+    fall = 0.5 * GRAVITY * T - (landing_com - lift_off)[2] / T
     turning, ready = _turning_knots(schedule.flight_knots)
     share = 1 - ready / schedule.flight_knots  # of the flight, in which the feet are drawn up
     landing = _landing(landing_feet + lead @ R_landing, height, fall, T, share, robot, model, ik)
@@ -155,7 +155,7 @@ def _landing_stance(robot: Robot, model: BaseFrameModel) -> tuple[np.ndarray, fl
 
 
 def _landing_lead(
-    feet: np.ndarray, height: float, way: np.ndarray, fall: float, schedule: Schedule, settings: PlannerSettings
+    feet: np.ndarray, height: float, way: np.ndarray, schedule: Schedule, settings: PlannerSettings
 ) -> np.ndarray:
     """Return how far ``(3,)`` [m] the support is set ahead of the centre of mass at touchdown.
 
@@ -168,7 +168,6 @@ def _landing_lead(
         feet: ``(n_c, 3)`` [m] from the centre of mass, in S.
         height: of the centre of mass [m].
         way: of the centre of mass from standing to over the landing place ``(3,)`` [m].
-        fall: speed at which it comes down [m/s].
         schedule: of the motion.
         settings: of the planner.
     """
@@ -176,16 +175,13 @@ def _landing_lead(
     if distance < _NEARBY:
         return np.zeros(3)
     direction = np.array([way[0], way[1], 0.0]) / distance
+    half = float(np.ptp(feet @ direction)) / 2
+    falling = np.clip(1 - half / (_LONG_SUPPORT * height), 0.0, 1.0)
+    fall = abs(way[2] / T - 0.5 * GRAVITY * T)
     stopping = np.sqrt(height / GRAVITY) / (1 + fall / np.sqrt(GRAVITY * height))
     little = settings.landing_lead * distance / T
     far = stopping * distance / (T + _PUSHED * schedule.take_off_time + stopping)
-    return (little + _shortness(feet, height, direction) * max(far - little, 0.0)) * direction
-
-
-def _shortness(feet: np.ndarray, height: float, direction: np.ndarray) -> float:
-    """Return 0 for a support so long in a direction ``(3,)`` that it catches the robot by itself … 1 for a point."""
-    half = float(np.ptp(feet @ direction)) / 2
-    return float(np.clip(1 - half / (_LONG_SUPPORT * height), 0.0, 1.0))
+    return (little + falling * max(far - little, 0.0)) * direction
 
 
 class _Landing(NamedTuple):

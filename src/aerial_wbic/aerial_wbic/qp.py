@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
-from aerial_model.compiled import cholesky, cholesky_solve, compiled
+from aerial_model.compiled import cholesky, cholesky_solve, compiled, invert
 from aerial_model.contact import friction_pyramid
 from aerial_model.kinematics import Configuration
 from aerial_model.robot import BASE_TWIST, JOINT_VELOCITY, Robot
@@ -325,7 +325,7 @@ def give_way(state: Configuration, contact: np.ndarray, give: GiveWay) -> None:
         cholesky(A, L)
         cholesky_solve(L, J_b)
         E[JOINT_VELOCITY] = -(moved @ J_b)
-    give.inverse[:] = np.linalg.inv(np.ascontiguousarray(state.M[BASE_TWIST]) @ E)
+    invert(np.ascontiguousarray(state.M[BASE_TWIST]) @ E, give.inverse)
 
 
 @compiled

@@ -59,14 +59,18 @@ class Layout:
         """Return the record that a message holds; its arrays are writable, and nobody else's.
 
         Raises:
-            ValueError: naming the sequence whose length does not fit.
+            ValueError: naming the sequence whose length does not fit, or if the bytes hold no message.
         """
         if data[:2] == _ENCAPSULATION[:2] and len(data) >= len(_ENCAPSULATION) + self._dtype.itemsize:
             # four bytes more put every number at a multiple of its size
             record = np.frombuffer(bytearray(4) + data, self._dtype, count=1, offset=4 + len(_ENCAPSULATION))[0]
             if all(record[_length(name)] == self._n for name in self._sequences):
                 return record
-        return self._record(deserialize_message(data, self._type))
+        try:
+            message = deserialize_message(data, self._type)
+        except RuntimeError:
+            raise ValueError(f"expected a {self._type.__name__}, found {len(data)} bytes that hold none") from None
+        return self._record(message)
 
     def _record(self, message: Any) -> np.void:
         """Return the record of a message that came in another encoding, if its lengths fit."""

@@ -19,11 +19,7 @@ from aerial_model.errors import InvalidPlanError, RefusalCode, RefusalError
 from aerial_model.request import ControllerCommand
 from aerial_model.robot import Robot
 from aerial_model.ros import node, qos
-from aerial_model.ros.messages import (
-    plan_from_message,
-    result_to_message,
-    to_stamp,
-)
+from aerial_model.ros.messages import plan_from_message, result_to_message, to_stamp
 from aerial_model.ros.wire import CommandWire, StateWire
 from aerial_model.state import Command, Measurement
 from aerial_msgs.msg import ControllerStatus, JointCommand, MotionPlan, MotionResult, MotionSelection, RobotState
