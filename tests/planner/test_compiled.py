@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from aerial_planner.compiled import CompilationError, FunctionLibrary
+from aerial_planner.nlp import FlatProgram
 from aerial_planner.planner import Planner
-from aerial_planner.stage import Rows
-from aerial_planner.transcription import Problem, SolverOptions
+from aerial_planner.solver import SolverName, SolverOptions
+from aerial_planner.stage import Rows, StageKind
 
 from .conftest import jump
 
@@ -62,10 +63,13 @@ def test_a_problem_solves_with_compiled_functions_and_without(library, kind):
     kinds = [kind, end.stage("end", x, ca.SX(0, 1), ca.SX(0, 1), ca.SX(0), None)]
     for k in kinds:
         library.compile(k)
-    problems = [Problem(kinds, SolverOptions(), lib) for lib in (None, library)]
-    point = np.random.default_rng(1).normal(size=problems[0].functions()["nlp_g"].size1_in(0))
+    options = SolverOptions(solver=SolverName.FATROP)
+    programs = [
+        FlatProgram(kinds, functions_of, options).functions for functions_of in (StageKind.functions, library.load)
+    ]
+    point = np.random.default_rng(1).normal(size=programs[0]["nlp_g"].size1_in(0))
     for name in ("nlp_f", "nlp_g", "nlp_jac_g"):
-        a, b = (problem.functions()[name].call([point, np.ones(1)])[-1] for problem in problems)
+        a, b = (functions[name].call([point, np.ones(1)])[-1] for functions in programs)
         np.testing.assert_allclose(ca.DM(a).full(), ca.DM(b).full(), atol=1e-14)
 
 

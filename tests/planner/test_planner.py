@@ -14,6 +14,7 @@ from aerial_model.robot import BASE_ORIENTATION
 from aerial_model.state import Estimate
 from aerial_model.terrain import Terrain
 from aerial_planner.planner import Planner
+from aerial_planner.solver import SolverName
 
 from .conftest import jump
 
@@ -239,8 +240,9 @@ def test_every_variant_finds_the_same_easy_jump(planner, forward, variant, warm_
     np.testing.assert_allclose(plan.com, forward.plan.com, atol=5e-3)
 
 
-def test_ipopt_finds_what_fatrop_finds(robot, forward):
-    plan = Planner(robot, solver="ipopt").plan(jump(0.4, 0.0)).plan
+@pytest.mark.parametrize("solver", [SolverName.FATROP, SolverName.IPOPT])
+def test_other_solvers_find_the_same(robot, forward, solver):
+    plan = Planner(robot, solver=solver).plan(jump(0.4, 0.0)).plan
     np.testing.assert_allclose(plan.com, forward.plan.com, atol=1e-4)
 
 

@@ -9,10 +9,10 @@ from aerial_planner.kino_dynamic import KinoDynamic, Variant
 from aerial_planner.reference import body_reference
 from aerial_planner.schedule import contact_schedule, load_motion
 from aerial_planner.settings import PlannerSettings
+from aerial_planner.solver import SolverOptions
 from aerial_planner.srbm import SingleRigidBody
 from aerial_planner.symbolic import base_frame_model
 from aerial_planner.thesis_literal import LiteralProblem
-from aerial_planner.transcription import SolverOptions
 
 from .conftest import jump
 

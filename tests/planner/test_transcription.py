@@ -1,12 +1,14 @@
-"""The stage-wise problem against a closed form, against CasADi's own derivatives, and FATROP against IPOPT."""
+"""The stage-wise problem against a closed form, against CasADi's own derivatives, and the solvers against each other."""
 
 import casadi as ca
 import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from aerial_planner.stage import Rows, StageData
-from aerial_planner.transcription import Problem, SolverOptions
+from aerial_planner.nlp import FlatProgram
+from aerial_planner.solver import SolverName, SolverOptions
+from aerial_planner.stage import Rows, StageData, StageKind
+from aerial_planner.transcription import Problem
 
 DT, N = 0.1, 60
 A = np.array([[1.0, DT], [0.0, 1.0]])
@@ -34,7 +36,7 @@ def stages(x_0, u_max=np.inf):
     return [first, *[middle] * (N - 1), StageData.free(p=np.zeros(0), x=np.zeros(2))]
 
 
-@pytest.mark.parametrize("solver", ["fatrop", "ipopt"])
+@pytest.mark.parametrize("solver", list(SolverName))
 def test_an_unconstrained_linear_problem_has_the_riccati_solution(solver):
     x_0 = np.array([1.0, -0.5])
     P = solve_discrete_are(A, B, np.eye(2), np.eye(1))
@@ -44,7 +46,7 @@ def test_an_unconstrained_linear_problem_has_the_riccati_solution(solver):
     np.testing.assert_allclose(solution.u[0], -gain @ x_0, atol=1e-3)
 
 
-@pytest.mark.parametrize("solver", ["fatrop", "ipopt"])
+@pytest.mark.parametrize("solver", list(SolverName))
 def test_bounds_are_kept_and_reached(solver):
     solution = double_integrator(solver).solve(stages(np.array([1.0, -0.5]), u_max=0.2))
     u = np.array(solution.u[:-1])
@@ -52,7 +54,8 @@ def test_bounds_are_kept_and_reached(solver):
     assert np.abs(u).max() == pytest.approx(0.2, abs=1e-4)
 
 
-def test_an_impossible_problem_is_not_called_solved():
+@pytest.mark.parametrize("solver", list(SolverName))
+def test_an_impossible_problem_is_not_called_solved(solver):
     x, u = ca.SX.sym("x"), ca.SX.sym("u")
     first, end = Rows(), Rows()
     first.equal("start", x)
@@ -66,7 +69,7 @@ def test_an_impossible_problem_is_not_called_solved():
         StageData.free(p=np.zeros(0), x=0 * one, u=0 * one, u_min=-one, u_max=one),
         StageData.free(p=np.zeros(0), x=0 * one),
     ]
-    solution = Problem(kinds, SolverOptions()).solve(data)
+    solution = Problem(kinds, SolverOptions(solver=solver)).solve(data)
     assert not solution.converged
     assert solution.max_violation > 1.0
 
@@ -80,7 +83,7 @@ def test_stage_wise_derivatives_are_those_of_the_whole_problem():
     end.between("b", y[0] * y[1] * y[2], -1.0, 1.0)
     one = first.stage("one", x, u, p, ca.exp(x[1]) * u**2, ca.vertcat(x[0] * u, ca.cos(x[1]), p * u))
     two = end.stage("two", y, ca.SX(0, 1), ca.SX(0, 1), ca.sumsqr(y) ** 2, None)
-    functions = Problem([one, two], SolverOptions()).functions()
+    functions = FlatProgram([one, two], StageKind.functions, SolverOptions(solver=SolverName.FATROP)).functions
 
     w, lam_g, lam_f = ca.MX.sym("w", 6), ca.MX.sym("l", 5), ca.MX.sym("lf")
     f, g = functions["nlp_f"](w, 0.7), functions["nlp_g"](w, 0.7)

@@ -24,6 +24,7 @@ from aerial_model.request import MotionRequest
 from aerial_model.robot import Robot
 from aerial_planner.compiled import default_cache
 from aerial_planner.planner import Planner
+from aerial_planner.solver import SolverName
 from aerial_sim.conditions import Conditions
 
 CONFIDENCE = 0.95  # of the intervals around a share
@@ -75,7 +76,7 @@ class Campaign:
     robot: Robot
     request: MotionRequest
     noise: str = "nominal"
-    solver: str = "fatrop"
+    solver: str = SolverName.RICCATI
 
     def attempt(self, trial: Trial) -> dict[str, Any]:
         """Return what came of a trial.

@@ -16,6 +16,7 @@ from aerial_planner.compiled import default_cache
 from aerial_planner.plan_library import PlanLibrary
 from aerial_planner.planner import Planner
 from aerial_planner.schedule import load_motion
+from aerial_planner.solver import SolverName
 
 
 def add_planner_arguments(parser: argparse.ArgumentParser) -> None:
@@ -32,7 +33,12 @@ def add_planner_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help="start from the nearest plan in it, if one is near; add the new one",
     )
-    planner.add_argument("--solver", choices=("fatrop", "ipopt"), default="fatrop", help="(default: fatrop)")
+    planner.add_argument(
+        "--solver",
+        choices=[solver.value for solver in SolverName],
+        default=SolverName.RICCATI.value,
+        help="(default: %(default)s)",
+    )
 
 
 def planner_choices(args: argparse.Namespace) -> dict[str, Any]:

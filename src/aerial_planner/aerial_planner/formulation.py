@@ -9,9 +9,10 @@ from aerial_model.robot import Robot
 from aerial_planner.compiled import FunctionLibrary
 from aerial_planner.schedule import Schedule
 from aerial_planner.settings import PlannerSettings
+from aerial_planner.solver import SolverOptions
 from aerial_planner.stage import StageKind
 from aerial_planner.symbolic import BaseFrameModel
-from aerial_planner.transcription import Problem, SolverOptions
+from aerial_planner.transcription import Problem
 
 _NEAR = {"initial_barrier": 1e-2, "bound_distance": 0.1}  # SolverOptions for a guess that is nearly the optimum
 

@@ -45,13 +45,14 @@ from aerial_planner.knots import (
 from aerial_planner.reference import Reference
 from aerial_planner.schedule import GRAVITY, Schedule, contact_bits
 from aerial_planner.settings import PlannerSettings
+from aerial_planner.solver import SolverOptions
 from aerial_planner.stage import Rows, StageData, StageKind
 from aerial_planner.symbolic import (
     BaseFrameModel,
     attitude_error,
 )
 from aerial_planner.trajectory import TakeOffTrajectory
-from aerial_planner.transcription import Solution, SolverOptions
+from aerial_planner.transcription import Solution
 
 
 class Variant(StrEnum):

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from aerial_model import rotation
-from aerial_model.errors import RefusalCode, RefusalError
+from aerial_model.errors import ConfigurationError, RefusalCode, RefusalError
 from aerial_model.plan import Plan
 from aerial_model.request import MotionRequest
 from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, Robot
@@ -27,11 +27,12 @@ from aerial_planner.reference import Reference, body_reference
 from aerial_planner.schedule import Motion, Schedule, contact_schedule, load_motion
 from aerial_planner.screen import screen
 from aerial_planner.settings import PlannerSettings
+from aerial_planner.solver import SolverName, SolverOptions
 from aerial_planner.srbm import SingleRigidBody
 from aerial_planner.stage import StageKind
 from aerial_planner.symbolic import base_frame_model
 from aerial_planner.trajectory import TakeOffTrajectory
-from aerial_planner.transcription import Solution, SolverOptions
+from aerial_planner.transcription import Solution
 
 _TOLERANCE = 3e-4  # of the optimum: tighter ones cost two iterations and gain a hundred-thousandth of the cost
 _ITERATIONS_MAX = 50  # of one solve: those that succeed take 10 to 40
@@ -102,20 +103,23 @@ class Planner:
 
     Args:
         robot: that moves.
-        solver: ``"fatrop"`` or ``"ipopt"``.
+        solver: one of ``SolverName``.
         settings: None: the robot's.
         cache: folder of compiled functions (see ``compiled``); None: evaluate interpreted ones.
         actuator_tolerance: exact torque, voltage or speed over its limit from which a plan is refused; infinite to see
             what a plan asks for that is not refused for it.
         plans: made before; the nearest one replaces the single rigid body as start, and new ones are added. With it,
             equal requests need not give plans equal to the last bit.
+
+    Raises:
+        ConfigurationError: if there is no such solver.
     """
 
     def __init__(
         self,
         robot: Robot,
         *,
-        solver: str = "fatrop",
+        solver: str = SolverName.RICCATI,
         settings: PlannerSettings | None = None,
         cache: Path | None = None,
         actuator_tolerance: float = ACTUATOR_TOLERANCE,
@@ -126,6 +130,8 @@ class Planner:
         self.plans = plans
         self.settings = settings or robot.section("planner", PlannerSettings)
         self._library = FunctionLibrary(cache) if cache else None
+        if solver not in list(SolverName):
+            raise ConfigurationError(f"solver: expected one of {', '.join(SolverName)}, found '{solver}'")
         self.options = SolverOptions(solver=solver, tolerance=_TOLERANCE, max_iterations=_ITERATIONS_MAX)
         self._model = base_frame_model(robot)
         self._ik = InverseKinematics(robot, self._model)

@@ -24,6 +24,7 @@ from aerial_planner.knots import mean_com
 from aerial_planner.reference import Reference
 from aerial_planner.schedule import GRAVITY, Schedule, contact_bits
 from aerial_planner.settings import PlannerSettings
+from aerial_planner.solver import SolverOptions
 from aerial_planner.stage import Rows, StageData, StageKind
 from aerial_planner.symbolic import (
     BaseFrameModel,
@@ -33,7 +34,7 @@ from aerial_planner.symbolic import (
     rotation_matrix,
 )
 from aerial_planner.trajectory import TakeOffTrajectory
-from aerial_planner.transcription import Solution, SolverOptions
+from aerial_planner.transcription import Solution
 
 _ITERATIONS_MAX = 35  # of one try: those that succeed take 10 to 30
 _REACH_SAMPLES = 2000  # random poses from which the longest leg is read

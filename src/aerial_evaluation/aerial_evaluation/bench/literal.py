@@ -7,10 +7,10 @@ from aerial_evaluation.bench.subject import Subject, usual_request, usual_schedu
 from aerial_planner.inverse_kinematics import InverseKinematics
 from aerial_planner.kino_dynamic import Variant
 from aerial_planner.reference import body_reference
+from aerial_planner.solver import SolverOptions
 from aerial_planner.srbm import SingleRigidBody
 from aerial_planner.symbolic import base_frame_model
 from aerial_planner.thesis_literal import LiteralProblem, LiteralSolution
-from aerial_planner.transcription import SolverOptions
 
 REPEATS = 3  # at most: it is slow
 

@@ -30,7 +30,7 @@ _PASSED_ON = {  # what a trial alone must be told, and what it takes to be so
     "gap": None,
     "edge": None,
     "variant": "AAKD*",
-    "solver": "fatrop",
+    "solver": "riccati",
     "noise": "nominal",
 }
 

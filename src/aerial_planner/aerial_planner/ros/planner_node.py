@@ -35,6 +35,7 @@ from aerial_planner.plan_library import PlanLibrary
 from aerial_planner.planner import Planner
 from aerial_planner.ros.worker import Worker
 from aerial_planner.schedule import known_motions
+from aerial_planner.solver import SolverName
 
 REPEAT_PERIOD = 0.5  # from one publication of a plan that no controller has answered to the next [s]
 REPEAT_TIME = 8.0  # for which it is repeated: on a busy machine, nodes that have just started find each other late [s]
@@ -47,14 +48,14 @@ class _CancelledError(Exception):
 class PlannerNode(node.AerialNode):
     """Plans what is selected, from where the robot is believed to stand.
 
-    Parameters: ``solver`` (fatrop or ipopt), ``niceness`` of the planning thread (0 to 19), ``warm_up`` (motions whose
+    Parameters: ``solver`` (riccati, fatrop or ipopt), ``niceness`` of the planning thread (0 to 19), ``warm_up`` (motions whose
     problems are built on activation: names separated by commas, or ``all``), ``library`` (folder of plans to start from
     and to add to; empty: none), and those of every node.
     """
 
     def __init__(self, **options: Any) -> None:
         super().__init__("planner", **options)
-        self.declare_parameter("solver", "fatrop")
+        self.declare_parameter("solver", SolverName.RICCATI.value)
         self.declare_parameter("niceness", 5)
         self.declare_parameter("warm_up", "all")
         self.declare_parameter("library", "")

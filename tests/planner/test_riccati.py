@@ -1,0 +1,91 @@
+"""The constrained Riccati recursion against the dense system of the optimality conditions."""
+
+import numpy as np
+import pytest
+
+from aerial_planner.riccati import LinearQuadratic
+
+
+def problem(seed, *, nx=(4, 5, 3, 4), nu=(3, 2, 3, 0), nc=(4, 3, 1, 2)):
+    """Return a convex problem with random numbers."""
+    rng = np.random.default_rng(seed)
+    lq = LinearQuadratic(np.array(nx), np.array(nu), np.array(nc))
+    for k, (x, u, c) in enumerate(zip(nx, nu, nc, strict=True)):
+        y = x + u
+        root = rng.normal(size=(y, y))
+        lq.Q[k, :y, :y], lq.q[k, :y] = root @ root.T, rng.normal(size=y)
+        lq.C[k, :c, :y], lq.c[k, :c] = rng.normal(size=(c, y)), rng.normal(size=c)
+        if k < len(nx) - 1:
+            following = nx[k + 1]
+            lq.F[k, :following, :y], lq.f[k, :following] = rng.normal(size=(following, y)), rng.normal(size=following)
+    return lq
+
+
+def residuals(lq):
+    """Return the gradient of the Lagrangian and the misses of all constraints at the solution."""
+    y = [lq.y[k, : x + u] for k, (x, u) in enumerate(zip(lq.nx, lq.nu, strict=True))]
+    gradients, misses = [], []
+    for k, y_k in enumerate(y):
+        n, c, u = len(y_k), lq.nc[k], lq.nu[k]
+        C = lq.C[k, :c, :n]
+        gradient = lq.Q[k, :n, :n] @ y_k + lq.q[k, :n] + C.T @ lq.constraints[k, :c]
+        misses.append(C @ y_k + lq.c[k, :c])
+        if k > 0:
+            gradient[u:] += lq.dynamics[k - 1, : lq.nx[k]]
+        if k < len(y) - 1:
+            x = lq.nx[k + 1]
+            gradient -= lq.F[k, :x, :n].T @ lq.dynamics[k, :x]
+            misses.append(y[k + 1][lq.nu[k + 1] :] - lq.F[k, :x, :n] @ y_k - lq.f[k, :x])
+        gradients.append(gradient)
+    return np.concatenate(gradients), np.concatenate(misses)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_solution_and_multipliers_meet_the_optimality_conditions(seed):
+    lq = problem(seed)
+    assert lq.solve()
+    for residual in residuals(lq):
+        np.testing.assert_allclose(residual, 0.0, atol=1e-8)
+
+
+def test_constraints_on_states_alone_are_handed_to_the_stage_before():
+    lq = problem(1)
+    lq.C[1, :3, :2] = 0.0  # the second stage's three rows say nothing of its controls
+    assert lq.solve()
+    for residual in residuals(lq):
+        np.testing.assert_allclose(residual, 0.0, atol=1e-8)
+
+
+def test_a_constraint_said_twice_changes_nothing():
+    once = problem(2, nc=(1, 3, 1, 2))
+    twice = problem(2, nc=(1, 3, 1, 2))
+    twice.C[1, 2], twice.c[1, 2] = 2.0 * twice.C[1, 1], 2.0 * twice.c[1, 1]
+    once.nc[1] = 2
+    assert once.solve()
+    assert twice.solve()
+    np.testing.assert_allclose(twice.y, once.y, atol=1e-9)
+    np.testing.assert_allclose(residuals(twice)[0], 0.0, atol=1e-8)
+
+
+def test_a_given_first_state_is_where_the_solution_starts():
+    lq = problem(3, nc=(4, 0, 0, 0))
+    lq.C[0, :4, :7], lq.c[0, :4] = np.eye(4, 7, 3), -np.arange(4)
+    assert lq.solve()
+    np.testing.assert_allclose(lq.y[0, 3:7], np.arange(4), atol=1e-10)
+
+
+def test_curvature_that_is_negative_only_where_constraints_forbid_it_does_not_matter():
+    lq = problem(4, nx=(2, 2), nu=(1, 0), nc=(0, 1))
+    lq.Q[1, :2, :2] = np.diag([-0.1, 1.0])
+    lq.C[1, 0, :2], lq.c[1, 0] = [1.0, 0.0], -0.3
+    assert lq.solve()
+    np.testing.assert_allclose(residuals(lq)[0], 0.0, atol=1e-9)
+
+
+def test_without_a_minimum_it_says_so_and_more_curvature_makes_one():
+    lq = problem(5, nc=(0, 0, 0, 0))
+    lq.Q[0, 0, 0] -= 50.0
+    assert not lq.solve()
+    lq.add_to_diagonal(100.0)
+    assert lq.solve()
+    np.testing.assert_allclose(residuals(lq)[0], 0.0, atol=1e-8)
