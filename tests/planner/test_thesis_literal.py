@@ -38,27 +38,27 @@ def both(request, robot):
     guess, _ = SingleRigidBody(robot, model, ik, settings, SolverOptions()).solve(schedule, reference)
     stage = KinoDynamic(robot, model, settings, variant, SolverOptions())
     reduced = stage.solve(schedule, reference, guess)
-    literal_problem = LiteralProblem(robot, model, settings, variant, schedule, reference)
-    return stage, schedule, reference, reduced, literal_problem, literal_problem.solve(guess)
+    literal_problem = LiteralProblem(robot, model, settings, variant, schedule, reference, guess)
+    return stage, schedule, reference, guess, reduced, literal_problem, literal_problem.solve()
 
 
 def test_from_the_same_start_both_reach_the_same_cost(both):
-    _, _, _, (_, reduced), _, literal = both
+    *_, (_, reduced), _, literal = both
     assert literal.converged
     assert reduced.cost == pytest.approx(literal.cost, rel=COST)
 
 
 def test_both_reach_the_same_trajectory(both):
-    _, _, _, (reduced, _), _, literal = both
+    *_, (reduced, _), _, literal = both
     np.testing.assert_allclose(reduced.com, literal.trajectory.com, atol=1e-3)
     np.testing.assert_allclose(reduced.joint_position, literal.trajectory.joint_position, atol=1e-2)
 
 
 def test_the_reduced_solution_satisfies_the_literal_constraints(both):
-    _, _, _, (reduced, _), problem, _ = both
+    *_, (reduced, _), problem, _ = both
     assert problem.violation(reduced) < VIOLATION
 
 
 def test_the_literal_solution_satisfies_the_reduced_constraints(both):
-    stage, schedule, reference, _, _, literal = both
-    assert stage.violation(schedule, reference, literal.trajectory) < VIOLATION
+    stage, schedule, reference, guess, *_, literal = both
+    assert stage.violation(schedule, reference, literal.trajectory, guess) < VIOLATION

@@ -10,7 +10,7 @@ import pinocchio as pin
 from aerial_model import rotation
 from aerial_model.plan import Plan
 from aerial_model.request import MotionRequest
-from aerial_model.robot import BASE_TWIST, JOINT_VELOCITY, Robot
+from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, BASE_TWIST, JOINT_POSITION, JOINT_VELOCITY, Robot
 from aerial_planner.flight import integrate_flight
 from aerial_planner.reference import Reference
 from aerial_planner.schedule import GRAVITY, Schedule
@@ -116,7 +116,7 @@ def assemble(
         com=np.vstack([take_off.com, com[1:]]),
         com_velocity=np.vstack([take_off.com_velocity, com_velocity[1:]]),
         angular_momentum=np.vstack([take_off.angular_momentum, np.tile(alpha, (K - N - 1, 1))]),
-        foot_position=np.array([robot.contact_positions(q_k) for q_k in q]),
+        foot_position=_feet(model, q),
         force=force,
         contact=contact,
         take_off_time=float(take_off_time[-1]),
@@ -177,6 +177,12 @@ def _configurations(model: BaseFrameModel, com: np.ndarray, orientation: np.ndar
     com_B = np.asarray(model.com.map(len(q_j))(q_j.T)).T
     base = com - np.einsum("kab,kb->ka", rotation.matrix(orientation), com_B)
     return np.hstack([base, orientation, q_j])
+
+
+def _feet(model: BaseFrameModel, q: np.ndarray) -> np.ndarray:
+    """Return the contact points ``(K, n_c, 3)`` at configurations ``(K, nq)``, in their frame."""
+    feet = np.asarray(model.feet.map(len(q))(q[:, JOINT_POSITION].T)).T.reshape(len(q), -1, 3)
+    return q[:, None, BASE_POSITION] + np.einsum("kab,kib->kia", rotation.matrix(q[:, BASE_ORIENTATION]), feet)
 
 
 def _consistent_velocity(

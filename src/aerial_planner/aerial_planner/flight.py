@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import casadi as ca
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from aerial_model import rotation
+from aerial_model.compiled import compiled, matrix_of, product_of, quaternion
+from aerial_model.rotation import IDENTITY
 from aerial_planner.reference import FlightPath
 from aerial_planner.symbolic import BaseFrameModel
 
@@ -72,30 +74,63 @@ def integrate_flight(
     count = len(half_times)
     inertia = np.asarray(model.inertia.map(count)(q_j.T)).T.reshape(count, 3, 3)  # symmetric
     legs_momentum = np.asarray(model.angular_momentum.map(count)(q_j.T, ca.DM.zeros(3, count), dq_j.T)).T
-    inertia_inverse = np.linalg.inv(inertia)
-
-    def rate(i: int, quaternion: np.ndarray) -> np.ndarray:
-        return inertia_inverse[i] @ (rotation.matrix(quaternion).T @ angular_momentum - legs_momentum[i])
-
-    def slope(i: int, quaternion: np.ndarray) -> np.ndarray:
-        return 0.5 * rotation.multiply(quaternion, np.append(rate(i, quaternion / np.linalg.norm(quaternion)), 0.0))
-
-    attitudes = [np.asarray(orientation)]
-    for k in range(n):
-        q, i = attitudes[-1], 2 * k
-        k_1 = slope(i, q)
-        k_2 = slope(i + 1, q + 0.5 * h * k_1)
-        k_3 = slope(i + 1, q + 0.5 * h * k_2)
-        k_4 = slope(i + 2, q + h * k_3)
-        q = q + h / 6 * (k_1 + 2 * k_2 + 2 * k_3 + k_4)
-        attitudes.append(q / np.linalg.norm(q))
+    attitude, omega = _turned(
+        h, np.linalg.inv(inertia), legs_momentum.copy(), angular_momentum.copy(), orientation.copy()
+    )
     return Flight(
         time=half_times[::2],
-        orientation=np.array(attitudes),
-        angular_velocity=np.array([rate(2 * k, attitudes[k]) for k in range(n + 1)]),
+        orientation=attitude,
+        angular_velocity=omega,
         joint_position=q_j[::2],
         joint_velocity=dq_j[::2],
     )
+
+
+@cache
+def rehearse() -> None:
+    """Run what Numba compiles once, so that no plan waits for it."""
+    _turned(0.1, np.zeros((3, 3, 3)), np.zeros((3, 3)), np.zeros(3), np.array(IDENTITY))
+
+
+@compiled
+def _turned(
+    h: float, inertia_inverse: np.ndarray, legs_momentum: np.ndarray, alpha: np.ndarray, orientation: np.ndarray
+) -> tuple:
+    """Return attitudes ``(n+1, 4)`` and body rates ``(n+1, 3)`` at every other one of 2 n + 1 times half a step apart."""
+    n = len(legs_momentum) // 2
+    attitude, omega = np.empty((n + 1, 4)), np.empty((n + 1, 3))
+    q = orientation.copy()
+    slopes = np.empty((4, 4))
+    for k in range(n):
+        attitude[k] = q
+        omega[k] = _rate(q, inertia_inverse[2 * k], legs_momentum[2 * k], alpha)
+        for stage, (share, late) in enumerate(((0.0, 0), (0.5, 1), (0.5, 1), (1.0, 2))):
+            p = q if stage == 0 else q + share * h * slopes[stage - 1]
+            w = _rate(p / np.linalg.norm(p), inertia_inverse[2 * k + late], legs_momentum[2 * k + late], alpha)
+            slope = product_of(quaternion(p), (w[0], w[1], w[2], 0.0))
+            for i in range(4):
+                slopes[stage, i] = 0.5 * slope[i]
+        q = q + h / 6 * (slopes[0] + 2 * slopes[1] + 2 * slopes[2] + slopes[3])
+        q = q / np.linalg.norm(q)
+    attitude[n] = q
+    omega[n] = _rate(q, inertia_inverse[2 * n], legs_momentum[2 * n], alpha)
+    return attitude, omega
+
+
+@compiled
+def _rate(q: np.ndarray, inertia_inverse: np.ndarray, legs_momentum: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+    """Return the body rate ``(3,)`` that makes up the angular momentum alpha together with the legs."""
+    R = matrix_of(quaternion(q))
+    left = np.empty(3)
+    for i in range(3):
+        left[i] = -legs_momentum[i]
+        for j in range(3):
+            left[i] += R[j][i] * alpha[j]
+    omega = np.zeros(3)
+    for i in range(3):
+        for j in range(3):
+            omega[i] += inertia_inverse[i, j] * left[j]
+    return omega
 
 
 def _legs(

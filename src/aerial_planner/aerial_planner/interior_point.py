@@ -14,12 +14,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 
+import casadi as ca
 import numpy as np
 
 from aerial_planner.riccati import LinearQuadratic
 from aerial_planner.solver import Outcome, SolverOptions
-from aerial_planner.stage import StageFunctions, StageKind
+from aerial_planner.stage import Rows, StageFunctions, StageKind
 from aerial_planner.stagewise import StageSequence
 
 _SLOWER, _FASTER = 0.2, 1.5  # κ_μ, θ_μ of (7)
@@ -33,6 +35,7 @@ _CORRECTIONS, _CORRECTION_GAIN = 4, 0.99  # p_max, κ_soc of the second-order co
 _SHORTEST = 1e-7  # step length that counts as none
 _CURVATURE_FIRST, _CURVATURE_LEAST, _CURVATURE_MOST = 1e-4, 1e-20, 1e10  # δ_w of algorithm IC
 _CURVATURE_UP_FIRST, _CURVATURE_UP, _CURVATURE_DOWN = 100.0, 8.0, 1 / 3
+_VIOLATION = 0.1  # of the tolerance is what constraints may be missed by: steps near the optimum are worth it
 _ROUNDING = 10 * np.finfo(float).eps  # what comparisons of large sums must forgive, as a share
 
 
@@ -69,14 +72,32 @@ class InteriorPoint:
         fixed = np.flatnonzero(lower == upper)
         at_knot = np.searchsorted(stages.z_0, fixed, side="right") - 1
         n_equal = stages.n_equal + np.bincount(at_knot, minlength=len(stages.nx))
-        newton = self._newton.setdefault(n_equal.tobytes(), LinearQuadratic(stages.nx, stages.nu, n_equal))
-        return _Iteration(self._options, stages, newton, w, lower, upper).run()
+        key = n_equal.tobytes()
+        if key not in self._newton:
+            self._newton[key] = LinearQuadratic(stages.nx, stages.nu, n_equal)
+        return _Iteration(self._options, stages, self._newton[key], w, lower, upper).run()
 
     def constraints(self, w: np.ndarray, p: np.ndarray) -> np.ndarray:
         """Return for each knot the misses of its dynamics, then its constraints, in one row."""
         self._stages.p[:] = p
         self._stages.evaluate(w)
         return self._stages.constraints()
+
+
+@cache
+def rehearse() -> None:
+    """Solve a problem of two knots, so that whatever Numba compiles is compiled, or read from its cache, before a plan."""
+    x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
+    first, end = Rows(), Rows()
+    first.equal("start", x[0] - 1.0)
+    end.between("goal", x[0], -0.1, 0.1)
+    none = ca.SX(0, 1)
+    kinds = [
+        first.stage("first", x, u, none, u**2, ca.vertcat(x[0] + u, x[1])),
+        end.stage("end", x, none, none, ca.sumsqr(x), None),
+    ]
+    bounds = np.array([[-np.inf, 0.5, -2.0, -np.inf, -np.inf], [np.inf, 0.5, 2.0, np.inf, np.inf]])
+    InteriorPoint(kinds, StageKind.functions, SolverOptions()).solve(np.zeros(5), np.zeros(0), *bounds)
 
 
 @dataclass
@@ -138,7 +159,8 @@ class _Iteration:
             if not np.isfinite(self.point.phi):
                 status = "not finite"
                 break
-            if self._error(0.0) <= options.tolerance:
+            violation = max(_largest(self.point.c), _largest(self.point.gap))
+            if self._error(0.0) <= options.tolerance and violation <= _VIOLATION * options.tolerance:
                 status = "solved"
                 break
             if iteration == options.max_iterations:
@@ -247,7 +269,7 @@ class _Iteration:
         q, diagonal = stages.gradient.copy(), np.full(len(self.w), curvature)
         q[self.bounded] += pull[n_rows:]
         diagonal[self.bounded] += weight[n_rows:]
-        stages.state(newton, q, diagonal, np.array([weight[:n_rows], pull[:n_rows]]), c, self.fixed)
+        stages.state(newton, q, diagonal, weight[:n_rows], pull[:n_rows], c, self.fixed)
         while not newton.solve():
             more = self._more_curvature(curvature)
             if more > _CURVATURE_MOST:

@@ -14,7 +14,7 @@ With timing optimized, x has the factor by which the phase's time steps differ f
 last knot of a phase, whose u sets that of the next; the cost of a knot is weighted with it, as an integral's would be.
 
 The rates of the knot before give the joint accelerations: the torque limits then hold for −Jᵀf *and* the inertia of the
-legs (``knots.LegInertia``). With (3.14) alone, which neglects it, unloaded legs whip around for free and the last force
+legs (``knots.LegInertia``) in the pose of the guess. With (3.14) alone, which neglects it, unloaded legs whip around for free and the last force
 before lift-off becomes an impulse that no leg could follow.
 
 In flight the legs follow a given path from the take-off pose through the tuck to the landing pose and turn the body
@@ -24,6 +24,7 @@ there are any, go where the angular momentum asks them to.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import StrEnum
 
 import casadi as ca
@@ -80,7 +81,7 @@ class KinoDynamic(Formulation):
         super().__init__(robot, model, settings, options, library)
         self.variant = variant
         self.timed = timed
-        self._leg_inertia = LegInertia.of(robot)
+        self._inertia_at_home = LegInertia.at(robot, robot.poses["home"])
 
     def solve(
         self,
@@ -101,12 +102,17 @@ class KinoDynamic(Formulation):
             margin: share of torque and voltage limits that may be used; None: the settings'.
         """
         margin = self.settings.margin if margin is None else margin
-        solution = self.problem(schedule, near=near).solve(self._stages(schedule, reference, guess, margin))
+        inertia = leg_inertia_along(self.robot, guess)
+        solution = self.problem(schedule, near=near).solve(self._stages(schedule, reference, guess, margin, inertia))
         return self._trajectory(schedule, solution), solution
 
-    def violation(self, schedule: Schedule, reference: Reference, trajectory: TakeOffTrajectory) -> float:
-        """Return by how much ``trajectory`` misses any constraint of the problem, SI units."""
-        return self.problem(schedule).violation(self._stages(schedule, reference, trajectory, self.settings.margin))
+    def violation(
+        self, schedule: Schedule, reference: Reference, trajectory: TakeOffTrajectory, guess: TakeOffTrajectory
+    ) -> float:
+        """Return by how much ``trajectory`` misses any constraint of the problem that starts at ``guess``, SI units."""
+        inertia = leg_inertia_along(self.robot, guess)
+        stages = self._stages(schedule, reference, trajectory, self.settings.margin, inertia)
+        return self.problem(schedule).violation(stages)
 
     def kinds(self, schedule: Schedule) -> list[StageKind]:
         """Return the stage kind of each knot."""
@@ -201,7 +207,7 @@ class KinoDynamic(Formulation):
         J = self.model.foot_jacobians(q_j)  # (3 n_c, n) in B
         pushing = np.flatnonzero(loaded)
         force_B = s.R_mid.T @ ca.horzcat(*(s.force[i] for i in pushing))
-        torque = self._leg_inertia.torque(s.ddq_j, force_B, self.model.feet(q_j)[:, pushing.tolist()])
+        torque = s.leg_inertia.torque(s.ddq_j, force_B, self.model.feet(q_j)[:, pushing.tolist()])
         for column, i in enumerate(pushing):
             torque -= J[3 * i : 3 * i + 3, :].T @ force_B[:, column]  # (3.14)
         for joint, name in enumerate(robot.joint_names):
@@ -296,7 +302,7 @@ class KinoDynamic(Formulation):
         arms, law = self.robot.arms, self.robot.actuators
         if self.variant is Variant.KD or len(arms) == 0:
             return
-        torque = ca.DM(self._leg_inertia.joint[np.ix_(arms, arms)]) @ flight.arm_acceleration
+        torque = ca.DM(self._inertia_at_home.joint[np.ix_(arms, arms)]) @ flight.arm_acceleration
         for row, joint in enumerate(arms):
             limit = float(law.torque_max[joint]) * self.settings.margin
             rows.between(f"{self.robot.joint_names[joint]} torque", torque[row] / limit, -1.0, 1.0)
@@ -323,7 +329,12 @@ class KinoDynamic(Formulation):
     # --- numbers of one request -------------------------------------------------------------------------------------
 
     def _stages(
-        self, schedule: Schedule, reference: Reference, guess: TakeOffTrajectory, margin: float
+        self,
+        schedule: Schedule,
+        reference: Reference,
+        guess: TakeOffTrajectory,
+        margin: float,
+        inertia: Sequence[LegInertia],
     ) -> list[StageData]:
         robot, settings = self.robot, self.settings
         n, N, M = robot.n_joints, len(schedule.contact), schedule.flight_knots
@@ -357,6 +368,7 @@ class KinoDynamic(Formulation):
                 reference.x_0,
                 np.zeros(n),
                 [margin],
+                inertia[k].parameters,
             ]
             u = [guess.angular_velocity[k], guess.joint_velocity[k], guess.force[k][loaded].ravel()]
             force_min = np.tile([-np.inf, -np.inf, settings.force_min], n_f)
@@ -443,6 +455,12 @@ class KinoDynamic(Formulation):
             flight_joint_position=flight[:, 7:],
             flight_angular_velocity=np.array([u[:3] for u in solution.u[N : N + schedule.flight_knots]]),
         )
+
+
+def leg_inertia_along(robot: Robot, guess: TakeOffTrajectory) -> list[LegInertia]:
+    """Return what the torque limits count of the legs' inertia on each take-off interval: its value at the guess."""
+    middle = 0.5 * (guess.joint_position[:-1] + guess.joint_position[1:])
+    return [LegInertia.at(robot, q_j) for q_j in middle]
 
 
 def _contact_sets(schedule: Schedule) -> list[tuple[tuple[bool, ...] | None, tuple[bool, ...]]]:

@@ -8,17 +8,19 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from aerial_model import rotation
 from aerial_model.kinematics import Kinematics
 from aerial_model.robot import BASE_TWIST, JOINT_VELOCITY, Robot
 from aerial_planner.schedule import GRAVITY
 from aerial_planner.symbolic import BaseFrameModel, quaternion_product, quaternion_step, rotation_matrix
 
+Matrix = np.ndarray | ca.SX
 _POINT = 1e-3  # a contact nearer to its joint than this stands on no link [m]
 
 
 @dataclass(frozen=True, kw_only=True)
 class LegInertia:
-    """What (3.14) neglects, from the mass matrix H at the home pose, rotor inertia included.
+    """What (3.14) neglects, from the mass matrix H at a given pose, rotor inertia included.
 
     With the base rows of the equations of motion solved for the base's acceleration, and their velocity terms left out,
 
@@ -27,17 +29,30 @@ class LegInertia:
     The second term is large when contacts turn the body fast: in a roll it is a third of the ab/adduction's torque.
     """
 
-    joint: np.ndarray  # H_jj − H_jb H_bb⁻¹ H_bj (n, n) [kg·m²]
-    wrench_share: np.ndarray  # H_jb H_bb⁻¹ (n, 6), linear first
+    joint: Matrix  # H_jj − H_jb H_bb⁻¹ H_bj (n, n) [kg·m²]
+    wrench_share: Matrix  # H_jb H_bb⁻¹ (n, 6), linear first
 
     @staticmethod
-    def of(robot: Robot) -> LegInertia:
-        """Return it for a robot."""
-        M = Kinematics(robot).at(robot.standing_configuration(), np.zeros(robot.model.nv)).M
+    def at(robot: Robot, q_j: np.ndarray) -> LegInertia:
+        """Return it for a robot with joints at ``q_j`` ``(n,)`` [rad]."""
+        q = np.concatenate([np.zeros(3), rotation.IDENTITY, q_j])
+        M = Kinematics(robot).at(q, np.zeros(robot.model.nv)).M
         share = np.linalg.solve(M[BASE_TWIST, BASE_TWIST], M[BASE_TWIST, JOINT_VELOCITY]).T
         return LegInertia(
             joint=M[JOINT_VELOCITY, JOINT_VELOCITY] - share @ M[BASE_TWIST, JOINT_VELOCITY], wrench_share=share
         )
+
+    @staticmethod
+    def symbols(n: int) -> LegInertia:
+        """Return parameters of a knot in its place."""
+        return LegInertia(joint=ca.SX.sym("H_jj", n, n), wrench_share=ca.SX.sym("H_jb", n, 6))
+
+    @property
+    def parameters(self) -> Matrix:
+        """All numbers as one column, which ``symbols`` stand for."""
+        if isinstance(self.joint, np.ndarray):
+            return np.concatenate([part.ravel(order="F") for part in (self.joint, self.wrench_share)])
+        return ca.vertcat(ca.vec(self.joint), ca.vec(self.wrench_share))
 
     def torque(self, ddq_j: ca.SX, force_B: ca.SX, feet_B: ca.SX) -> ca.SX:
         """Return the joint torques ``(n,)`` but for −Jᵀf.
@@ -48,7 +63,7 @@ class LegInertia:
             feet_B: contact points ``(3, n_c)`` in B [m].
         """
         moment = sum((ca.cross(feet_B[:, i], force_B[:, i]) for i in range(force_B.shape[1])), type(force_B).zeros(3))
-        return ca.DM(self.joint) @ ddq_j + ca.DM(self.wrench_share) @ ca.vertcat(ca.sum2(force_B), moment)
+        return ca.mtimes(self.joint, ddq_j) + ca.mtimes(self.wrench_share, ca.vertcat(ca.sum2(force_B), moment))
 
 
 class TakeOffKnot:
@@ -117,6 +132,7 @@ class TakeOffKnot:
         self.q_j_frozen = ca.SX.sym("q_j_frozen", n)
         self.x_0 = ca.SX.sym("x_0", self.motion.numel())
         self.margin = ca.SX.sym("margin")  # share of torque and voltage limits that may be used
+        self.leg_inertia = LegInertia.symbols(n)
         self.p = ca.vertcat(
             self.nominal_dt,
             self.r_ref,
@@ -127,6 +143,7 @@ class TakeOffKnot:
             ca.vec(self.foot_ref),
             self.x_0,
             self.margin,
+            self.leg_inertia.parameters,
         )
 
     @property

@@ -16,6 +16,7 @@ from aerial_model.plan import Plan
 from aerial_model.request import MotionRequest
 from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, Robot
 from aerial_model.state import Estimate
+from aerial_planner import flight, interior_point
 from aerial_planner.assembly import ActuatorUse, actuator_use, assemble
 from aerial_planner.checks import ACTUATOR_TOLERANCE, VIOLATION_TOLERANCE, attitude_miss, check, clearance_deficit
 from aerial_planner.collision import CollisionModel
@@ -37,7 +38,8 @@ from aerial_planner.transcription import Solution
 _TOLERANCE = 3e-4  # of the optimum: tighter ones cost two iterations and gain a hundred-thousandth of the cost
 _ITERATIONS_MAX = 50  # of one solve: those that succeed take 10 to 40
 _ITERATIONS_OF_REQUEST = 100  # after which nothing else is tried, so that a refusal takes no longer than a plan
-_TIGHTENING = 0.98  # by which the optimizer's limits are lowered further than exact torques were beyond them
+_EXACT_SHARE = 0.95  # of the limits is what exact torques may take; the rest is the controller's
+_TIGHTENING = 0.98  # by which the optimizer's limits are lowered further than exact torques were beyond that
 _WORTH_CORRECTING = np.deg2rad(1.5)  # by which a finely integrated flight may miss its attitude [rad]
 _CORRECTABLE = np.deg2rad(30.0)  # beyond this it is another motion [rad]
 _TOUCH_RISE = 0.02  # [m] by which to fly higher when a link would touch the terrain
@@ -134,6 +136,8 @@ class Planner:
             raise ConfigurationError(f"solver: expected one of {', '.join(SolverName)}, found '{solver}'")
         self.options = SolverOptions(solver=solver, tolerance=_TOLERANCE, max_iterations=_ITERATIONS_MAX)
         self._model = base_frame_model(robot)
+        interior_point.rehearse()
+        flight.rehearse()
         self._ik = InverseKinematics(robot, self._model)
         self._srbm = SingleRigidBody(robot, self._model, self._ik, self.settings, self.options, self._library)
         self._collisions = CollisionModel(robot)
@@ -199,6 +203,7 @@ class Planner:
         motion = load_motion(request.motion, self.robot)
         q_start = self._start_configuration(start)
         least_rise, margin, take_off, correction = 0.0, self.settings.margin, None, np.zeros(3)
+        from_a_plan = False  # then the legs' inertia is that of nearly the same poses
         while True:
             schedule = replace(self._schedule(request, motion, least_rise), correction=correction)
             reference = body_reference(schedule, q_start, self.robot, self._model, self._ik, self.settings)
@@ -212,7 +217,9 @@ class Planner:
             plan = assemble(request, self.robot, self._model, schedule, reference, take_off, self.settings)
             use = actuator_use(plan, self.robot)
             if self._may_tighten(stage, solution, use, clock):
-                margin *= _TIGHTENING * ACTUATOR_TOLERANCE / use.worst
+                if from_a_plan:
+                    margin *= _TIGHTENING * _EXACT_SHARE / use.worst
+                from_a_plan = True
                 continue
             if self._may_correct(attitude_miss(plan, schedule), solution, clock):
                 correction = correction - attitude_miss(plan, schedule)
@@ -230,9 +237,9 @@ class Planner:
             least_rise = float(plan.com[:, 2].max()) - plan.landing_com_height + missing + _CLEARANCE_SPARE
 
     def _may_tighten(self, stage: KinoDynamic, solution: Solution, use: ActuatorUse, clock: _Clock) -> bool:
-        """Return whether exact torques are beyond the limits although the optimizer's are not, and there is time."""
+        """Return whether exact torques are too near to the limits although the optimizer's are not, and there is time."""
         return (
-            use.worst > ACTUATOR_TOLERANCE
+            use.worst > _EXACT_SHARE
             and stage.variant is not Variant.KD
             and solution.max_violation <= VIOLATION_TOLERANCE
             and clock.iterations <= _ITERATIONS_OF_REQUEST

@@ -50,7 +50,7 @@ class LinearQuadratic:
             np.zeros(K + 1, dtype=np.int64),  # how many controls the rows eliminate; of stage K: initial states
             np.zeros((K + 1, y), dtype=np.int64),  # the order of the controls, those eliminated first
             np.zeros((K + 1, y, y + 1)),  # eliminated controls from the others, the state and one
-            np.zeros((K + 1, y, y + 1)),  # stationarity of the eliminated controls
+            np.zeros((K + 1, y, y + 1)),  # slope of a stage's own cost by these, from the same
             np.zeros((K + 1, y, x + 1)),  # the other controls from the state and one
         )
 
@@ -107,44 +107,32 @@ def _reduce(rows: np.ndarray, n: int, order: np.ndarray) -> int:
 
 
 @compiled
-def _eliminate(
-    M: np.ndarray,
-    rows: np.ndarray,
-    n: int,
-    order: np.ndarray,
-    k: int,
-    ranks: np.ndarray,
-    others: np.ndarray,
-    stationarity: np.ndarray,
-    gains: np.ndarray,
-) -> tuple:
-    """Remove the first ``n`` of the variables v of ½ [v; 1]ᵀ M [v; 1] s.t. rows [v; 1; ·] = 0.
+def _reduced(Q: np.ndarray, N: np.ndarray, rank: int, Y: np.ndarray) -> np.ndarray:
+    """Return ½ [v; 1]ᵀ Q [v; 1] as a matrix of the variables after the first ``rank``, which are −N times these.
 
-    Returns:
-        the cost of the others (with 1) in the form of M, and whether it has a minimum over those that the rows leave.
+    Writes into Y ``(rank, ·)`` what the gradient by the first ones is, from the others.
     """
-    size = len(M)
-    rank = _reduce(rows, n, order)
-    ranks[k] = rank
-    whole = np.arange(size)
-    whole[:n] = order[:n]
-    M = M[whole][:, whole]
-    N = np.ascontiguousarray(rows[:rank, rank:size])
-    M_12 = np.ascontiguousarray(M[:rank, rank:])
-    R = np.ascontiguousarray(M[rank:, rank:])
+    R = np.ascontiguousarray(Q[rank:, rank:])
     if rank > 0:
-        Y = M_12 - np.dot(np.ascontiguousarray(M[:rank, :rank]), N)
-        R = R - np.dot(np.ascontiguousarray(N.T), Y) - np.dot(np.ascontiguousarray(M_12.T), N)
-        others[k, :rank, : size - rank] = N
-        stationarity[k, :rank, : size - rank] = Y
-    free = n - rank
+        Q_12 = np.ascontiguousarray(Q[:rank, rank:])
+        Y[:] = Q_12 - np.dot(np.ascontiguousarray(Q[:rank, :rank]), N)
+        R -= np.dot(N.T, np.ascontiguousarray(Y)) + np.dot(Q_12.T, N)
+    return R
+
+
+@compiled
+def _minimized(R: np.ndarray, free: int, gains: np.ndarray) -> tuple:
+    """Return ½ [v; 1]ᵀ R [v; 1] minimized over the first ``free`` variables, and whether it has a minimum.
+
+    Writes into ``gains`` ``(free, ·)`` what these are, from the others.
+    """
     if free == 0:
         return R, True
     L = np.zeros((free, free))
     if not cholesky(R[:free, :free], L) > 0.0:
         return R, False
     V = np.ascontiguousarray(R[:free, free:])
-    width = size - n
+    width = V.shape[1]
     for i in range(free):
         for j in range(i):
             for c in range(width):
@@ -152,7 +140,7 @@ def _eliminate(
         scale = 1.0 / L[i, i]
         for c in range(width):
             V[i, c] *= scale
-    P = np.ascontiguousarray(R[free:, free:]) - np.dot(np.ascontiguousarray(V.T), V)
+    P = np.ascontiguousarray(R[free:, free:]) - np.dot(V.T, V)
     for i in range(free - 1, -1, -1):
         for j in range(i + 1, free):
             for c in range(width):
@@ -160,7 +148,7 @@ def _eliminate(
         scale = 1.0 / L[i, i]
         for c in range(width):
             V[i, c] *= scale
-    gains[k, :free, :width] = -V
+            gains[i, c] = -V[i, c]
     return P, True
 
 
@@ -178,68 +166,83 @@ def _backward(
     factor: tuple,
 ) -> bool:
     """Fill ``factor`` from the last stage to the first; return whether there is a minimum."""
-    P, H, n_h, kept, T, ranks, orders, others, stationarity, gains = factor
+    P, H, n_h, kept, T, ranks, orders, others, slopes, gains = factor
     K = len(nx)
-    for k in range(K - 1, -1, -1):
-        x, u = nx[k], nu[k]
-        y = x + u
-        M = np.empty((y + 1, y + 1))
-        M[:y, :y] = Q[k, :y, :y]
-        M[:y, y] = q[k, :y]
-        M[y, :y] = q[k, :y]
-        M[y, y] = 0.0
-        own, after = nc[k], n_h[k + 1] if k < K - 1 else 0
-        m = own + after
-        rows = np.zeros((m, y + 1 + m))
-        rows[:own, :y] = C[k, :own, :y]
-        rows[:own, y] = c[k, :own]
-        for i in range(m):
-            rows[i, y + 1 + i] = 1.0
-        if k < K - 1:
-            x_next = nx[k + 1]
-            step = np.empty((x_next, y + 1))
+    for k in range(K - 1, -2, -1):
+        # The first state is like controls of a stage before it, K as it were, that costs nothing by itself.
+        at = k if k >= 0 else K
+        x, u, own = (nx[k], nu[k], nc[k]) if k >= 0 else (0, nx[0], 0)
+        y, follows = x + u, 0 <= k + 1 < K
+        after = n_h[k + 1] if follows else 0
+        x_next = nx[k + 1] if follows else 0
+        step = np.zeros((x_next, y + 1))
+        if k < 0:
+            for i in range(u):
+                step[i, i] = 1.0
+        elif follows:
             step[:, :y] = F[k, :x_next, :y]
             step[:, y] = f[k, :x_next]
-            P_next = np.ascontiguousarray(P[k + 1, :x_next, :x_next])
-            M += np.dot(np.ascontiguousarray(step.T), np.dot(P_next, step))
-            lead = np.dot(np.ascontiguousarray(P[k + 1, :x_next, x_next]), step)
-            M[:, y] += lead
-            M[y, :] += lead
-            if after > 0:
-                rows[own:, : y + 1] = np.dot(np.ascontiguousarray(H[k + 1, :after, :x_next]), step)
-                rows[own:, y] += H[k + 1, :after, x_next]
-        order = np.arange(u)
-        cost, bounded = _eliminate(M, rows, u, order, k, ranks, others, stationarity, gains)
+        m = own + after
+        rows = np.zeros((m, y + 1 + m))
+        if own > 0:
+            rows[:own, :y] = C[k, :own, :y]
+            rows[:own, y] = c[k, :own]
+        if after > 0:
+            rows[own:, : y + 1] = np.dot(np.ascontiguousarray(H[k + 1, :after, :x_next]), step)
+            for i in range(after):
+                rows[own + i, y] += H[k + 1, i, x_next]
+        for i in range(m):
+            rows[i, y + 1 + i] = 1.0
+
+        order = np.arange(y + 1)
+        rank = _reduce(rows, u, order)
+        ranks[at] = rank
+        orders[at, :u] = order[:u]
+        T[at, :m, :m] = rows[:, y + 1 :]
+        rest = y + 1 - rank
+        N = np.ascontiguousarray(rows[:rank, rank : y + 1])
+        others[at, :rank, :rest] = N
+
+        M = np.zeros((y + 1, y + 1))
+        if k >= 0:
+            for i in range(y):
+                for j in range(y):
+                    M[i, j] = Q[k, order[i], order[j]]
+                M[i, y] = M[y, i] = q[k, order[i]]
+        R = _reduced(M, N, rank, slopes[at, :rank, :rest])
+        if follows:
+            reached = np.empty((x_next, rest))  # the next state from the variables that are left
+            for i in range(x_next):
+                for j in range(rest):
+                    reached[i, j] = step[i, order[rank + j]]
+            if rank > 0:
+                eliminated = np.empty((x_next, rank))
+                for i in range(x_next):
+                    for j in range(rank):
+                        eliminated[i, j] = step[i, order[j]]
+                reached -= np.dot(eliminated, N)
+            p = np.ascontiguousarray(P[k + 1, :x_next, x_next])
+            R += np.dot(reached.T, np.dot(np.ascontiguousarray(P[k + 1, :x_next, :x_next]), reached))
+            lead = np.dot(p, reached)
+            R[:, rest - 1] += lead
+            R[rest - 1, :] += lead
+        cost, bounded = _minimized(R, u - rank, gains[at])
         if not bounded:
             return False
-        orders[k, :u] = order
-        P[k, :x, : x + 1] = cost[:x]
-        T[k, :m, :m] = rows[:, y + 1 :]
+        if k < 0:
+            break
+        # Rounding would double an asymmetry at every stage.
+        P[k, :x, :x] = 0.5 * (cost[:x, :x] + cost[:x, :x].T)
+        P[k, :x, x] = cost[:x, x]
         # Rows without controls: those that say something are asked of the state.
         count = 0
-        for i in range(ranks[k], m):
-            largest = 0.0
-            for j in range(u, y):
-                largest = max(largest, abs(rows[i, j]))
-            if largest > _RANK:
+        for i in range(rank, m):
+            if np.max(np.abs(rows[i, u:y])) > _RANK:
                 H[k, count, : x + 1] = rows[i, u : y + 1]
                 kept[k, count] = i
                 count += 1
         n_h[k] = count
-    # The first state: as controls of a stage before.
-    x, m = nx[0], n_h[0]
-    M = np.zeros((x + 1, x + 1))
-    M[:x] = P[0, :x, : x + 1]
-    M[x, :x] = P[0, :x, x]
-    rows = np.zeros((m, x + 1 + m))
-    rows[:, : x + 1] = H[0, :m, : x + 1]
-    for i in range(m):
-        rows[i, x + 1 + i] = 1.0
-    order = np.arange(x)
-    _, bounded = _eliminate(M, rows, x, order, K, ranks, others, stationarity, gains)
-    orders[K, :x] = order
-    T[K, :m, :m] = rows[:, x + 1 :]
-    return bounded
+    return True
 
 
 @compiled
@@ -255,54 +258,45 @@ def _forward(
     factor: tuple,
 ) -> None:
     """Write solution and multipliers from the first stage to the last."""
-    P, H, n_h, kept, T, ranks, orders, others, stationarity, gains = factor
+    P, H, n_h, kept, T, ranks, orders, others, slopes, gains = factor
     K = len(nx)
-    one = np.ones(1)
-    x, multipliers = _recover(one, nx[0], np.zeros(n_h[0]), K, ranks, orders, others, stationarity, gains, T)
-    for k in range(K):
-        m = nc[k] + (n_h[k + 1] if k < K - 1 else 0)
-        reduced = np.zeros(m)
-        for i in range(n_h[k]):
-            reduced[kept[k, i]] = multipliers[i]
-        u, of_rows = _recover(
-            np.concatenate((x, one)), nu[k], reduced, k, ranks, orders, others, stationarity, gains, T
-        )
-        n_y = nu[k] + nx[k]
-        y[k, : nu[k]] = u
-        y[k, nu[k] : n_y] = x
-        constraints[k, : nc[k]] = of_rows[: nc[k]]
-        if k < K - 1:
+    x, pushes = np.zeros(0), np.zeros(0)  # the state, and the multipliers of what is asked of it
+    for k in range(-1, K):
+        at = k if k >= 0 else K
+        n_u, own = (nu[k], nc[k]) if k >= 0 else (nx[0], 0)
+        rank, follows = ranks[at], k + 1 < K
+        after = n_h[k + 1] if follows else 0
+        known = np.append(x, 1.0)
+        free = np.dot(np.ascontiguousarray(gains[at, : n_u - rank, : len(known)]), known)
+        left = np.concatenate((free, known))
+        u = np.empty(n_u)
+        for i in range(rank):
+            u[orders[at, i]] = -np.dot(others[at, i, : len(left)], left)
+        for i in range(n_u - rank):
+            u[orders[at, rank + i]] = free[i]
+        gradient = np.zeros(0)
+        if k >= 0:
+            y[k, :n_u] = u
+            y[k, n_u : n_u + len(x)] = x
+        if follows:
             n = nx[k + 1]
-            x = np.dot(np.ascontiguousarray(F[k, :n, :n_y]), y[k, :n_y]) + f[k, :n]
-            multipliers = of_rows[nc[k] :]
+            n_y = n_u + len(x)
+            x = np.dot(np.ascontiguousarray(F[k, :n, :n_y]), y[k, :n_y]) + f[k, :n] if k >= 0 else u
             gradient = np.dot(np.ascontiguousarray(P[k + 1, :n, :n]), x) + P[k + 1, :n, n]
-            for i in range(n_h[k + 1]):
-                gradient += multipliers[i] * H[k + 1, i, :n]
-            dynamics[k, :n] = -gradient
-
-
-@compiled
-def _recover(
-    known: np.ndarray,
-    n: int,
-    reduced: np.ndarray,
-    k: int,
-    ranks: np.ndarray,
-    orders: np.ndarray,
-    others: np.ndarray,
-    stationarity: np.ndarray,
-    gains: np.ndarray,
-    T: np.ndarray,
-) -> tuple:
-    """Return the ``n`` variables that stage ``k`` removed, and the multipliers of its rows."""
-    rank = ranks[k]
-    free = n - rank
-    left = np.concatenate((np.dot(np.ascontiguousarray(gains[k, :free, : len(known)]), known), known))
-    values = np.empty(n)
-    for i in range(rank):
-        values[orders[k, i]] = -np.dot(others[k, i, : len(left)], left)
-        reduced[i] = -np.dot(stationarity[k, i, : len(left)], left)
-    for i in range(free):
-        values[orders[k, rank + i]] = left[i]
-    m = len(reduced)
-    return values, np.dot(np.ascontiguousarray(T[k, :m, :m].T), reduced)
+        reduced = np.zeros(own + after)
+        for i in range(rank):
+            reduced[i] = -np.dot(slopes[at, i, : len(left)], left)
+            for j in range(len(gradient)):
+                reduced[i] -= gradient[j] * (F[k, j, orders[at, i]] if k >= 0 else 1.0 * (j == orders[at, i]))
+        if k >= 0:
+            for i in range(n_h[k]):
+                reduced[kept[k, i]] = pushes[i]
+        m = own + after
+        of_rows = np.dot(np.ascontiguousarray(T[at, :m, :m].T), reduced)
+        if k >= 0:
+            constraints[k, :own] = of_rows[:own]
+        pushes = of_rows[own:]
+        if follows and k >= 0:
+            for i in range(after):
+                gradient += pushes[i] * H[k + 1, i, : len(gradient)]
+            dynamics[k, : len(gradient)] = -gradient

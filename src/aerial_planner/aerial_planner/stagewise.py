@@ -12,6 +12,7 @@ import casadi as ca
 import numpy as np
 
 from aerial_model.compiled import compiled
+from aerial_planner.in_place import InPlace
 from aerial_planner.riccati import LinearQuadratic
 from aerial_planner.stage import StageFunctions, StageKind
 
@@ -64,16 +65,15 @@ class StageSequence:
         """Fill ``miss`` and ``g`` at w and return the cost."""
         self.w[:] = w
         for run in self._runs:
-            run.values()
+            run.values.evaluate()
         np.subtract(self.w[self.next_x], self.following, out=self.miss)
         return float(self.costs.sum())
 
     def differentiate(self) -> None:
         """Fill the gradients, and Jacobians and Hessians within, at the w evaluated last."""
         for run in self._runs:
-            run.gradients()
-            run.jacobians()
-            run.hessians()
+            for derivative in run.derivatives:
+                derivative.evaluate()
         self.lagrangian[self.next_x] += self.lam_x
 
     def state(
@@ -82,6 +82,7 @@ class StageSequence:
         q: np.ndarray,
         diagonal: np.ndarray,
         weights: np.ndarray,
+        pulls: np.ndarray,
         c: np.ndarray,
         fixed: np.ndarray,
     ) -> None:
@@ -91,7 +92,8 @@ class StageSequence:
             newton: to be written.
             q: gradient, as w, without the inequalities' share.
             diagonal: to be added to the Hessian's diagonal, as w.
-            weights: of the squares of the inequalities' changes, and their gradients ``(2, n)``.
+            weights: of the squares of the inequalities' changes.
+            pulls: the inequalities' gradients, to be added with their Jacobian.
             c: by how much the dynamics, the equalities and the fixed variables are missed.
             fixed: which variables are fixed.
         """
@@ -106,7 +108,7 @@ class StageSequence:
                 *(run.start, int(self.nx[run.start]), int(self.nu[run.start])),
                 *(run.F, run.F_at, run.G, run.G_at, run.row, run.H, run.H_at),
                 *(q[z].reshape(shape), diagonal[z].reshape(shape)),
-                weights[:, of_run].reshape(2, run.n, run.n_unequal),
+                *(part[of_run].reshape(run.n, run.n_unequal) for part in (weights, pulls)),
                 *(newton.Q, newton.q, newton.F, newton.C),
             )
         n_x, n_e = len(self.miss), int(self.e_0[-1])
@@ -185,33 +187,17 @@ class _Run:
         self.n_equal, self.n_unequal = int(equal.sum()), int((~equal).sum())
         # Of each constraint its number among the equalities, or −1 less that among the inequalities.
         self.row = np.where(equal, np.cumsum(equal) - 1, -np.cumsum(~equal)).astype(np.int64)
-        self.values = _mapped(functions.values, n, [z, p], [s.costs[start:end], following, g])
-        self.gradients = _mapped(functions.gradient, n, [z, p], [gradient])
-        self.jacobians = _mapped(functions.jacobian, n, [z, p], [self.F, self.G])
-        self.hessians = _mapped(functions.hessian, n, [z, p, *multipliers], [lagrangian, self.H])
+        self.values = InPlace(functions.values, n, [z, p], [s.costs[start:end], following, g])
+        self.derivatives = (
+            InPlace(functions.gradient, n, [z, p], [gradient]),
+            InPlace(functions.jacobian, n, [z, p], [self.F, self.G]),
+            InPlace(functions.hessian, n, [z, p, *multipliers], [lagrangian, self.H]),
+        )
 
 
 def _entries(sparsity: ca.Sparsity) -> np.ndarray:
     """Return row and column of each nonzero ``(nnz, 2)``."""
-    return np.array([sparsity.row(), sparsity.get_col()], dtype=np.int64).T.reshape(-1, 2)
-
-
-def _mapped(
-    function: ca.Function, n: int, arguments: Sequence[np.ndarray], results: Sequence[np.ndarray]
-) -> Callable[[], object]:
-    """Return what evaluates ``function`` for ``n`` knots from and into these arrays, without copies."""
-    mapped = function.map(n)
-    buffer, evaluate = mapped.buffer()
-    for i, array in enumerate(arguments):
-        if array.size:
-            buffer.set_arg(i, memoryview(array.ravel()))
-    for i, array in enumerate(results):
-        if mapped.nnz_out(i) != array.size:
-            raise ValueError(f"{function.name()}: result {i} has {mapped.nnz_out(i)} entries, expected {array.size}")
-        if array.size:
-            buffer.set_res(i, memoryview(array.ravel()))
-    evaluate.owner = mapped, buffer, arguments, results  # the buffer does not keep them
-    return evaluate
+    return np.column_stack([sparsity.row(), sparsity.get_col()]).astype(np.int64).reshape(-1, 2)
 
 
 @compiled
@@ -229,13 +215,14 @@ def _write(
     gradient: np.ndarray,
     diagonal: np.ndarray,
     weights: np.ndarray,
+    pulls: np.ndarray,
     Q_all: np.ndarray,
     q_all: np.ndarray,
     F_all: np.ndarray,
     C_all: np.ndarray,
 ) -> None:
     """Write the knots of one run into a linear-quadratic problem's arrays, in the order (u, x)."""
-    n, ny, n_unequal = len(F), nx + nu, weights.shape[2]
+    n, ny, n_unequal = len(F), nx + nu, weights.shape[1]
     D = np.empty((n_unequal, ny))
     for i in range(n):
         k = start + i
@@ -252,8 +239,8 @@ def _write(
             if r >= 0:
                 C_all[k, r, c] = G[i, e]
             else:
-                q[c] += weights[1, i, -1 - r] * G[i, e]
-                D[-1 - r, c] = np.sqrt(weights[0, i, -1 - r]) * G[i, e]
+                q[c] += pulls[i, -1 - r] * G[i, e]
+                D[-1 - r, c] = np.sqrt(weights[i, -1 - r]) * G[i, e]
         Q = np.dot(D.T, D)
         for e in range(len(H_at)):
             Q[H_at[e, 0], H_at[e, 1]] += H[i, e]

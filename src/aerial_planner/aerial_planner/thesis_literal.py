@@ -16,8 +16,8 @@ import numpy as np
 
 from aerial_model import rotation
 from aerial_model.robot import Robot
-from aerial_planner.kino_dynamic import Variant
-from aerial_planner.knots import LegInertia, holding_joints, link_slopes, mean_com
+from aerial_planner.kino_dynamic import Variant, leg_inertia_along
+from aerial_planner.knots import holding_joints, link_slopes, mean_com
 from aerial_planner.reference import Reference
 from aerial_planner.schedule import GRAVITY, Schedule
 from aerial_planner.settings import PlannerSettings
@@ -53,6 +53,7 @@ class LiteralProblem:
         variant: which actuator constraints to obey.
         schedule: contacts and flight.
         reference: what (3.4) measures deviations from.
+        guess: where to start; the legs' inertia is what it is there.
     """
 
     def __init__(
@@ -63,10 +64,11 @@ class LiteralProblem:
         variant: Variant,
         schedule: Schedule,
         reference: Reference,
+        guess: TakeOffTrajectory,
     ) -> None:
         began = time.perf_counter()
         self.robot, self.model, self.settings, self.variant = robot, model, settings, variant
-        self.schedule, self.reference = schedule, reference
+        self.schedule, self.reference, self.guess = schedule, reference, guess
         self.N, self.M = len(schedule.contact), schedule.flight_knots
         self.opti = ca.Opti()
         self._variables()
@@ -192,7 +194,7 @@ class LiteralProblem:
     def _limits(self) -> None:
         robot, settings, law = self.robot, self.settings, self.robot.actuators
         low, high = robot.planning_range
-        inertia = LegInertia.of(robot)
+        inertia = leg_inertia_along(robot, self.guess)
         frozen = ca.DM(robot.frozen_joints.astype(float))
         start = self.reference.x_0[-robot.n_joints :]
         for k in range(self.N + 1):
@@ -208,7 +210,7 @@ class LiteralProblem:
             if self.variant is Variant.AAKD_STAR:
                 q_j = frozen * start + (1 - frozen) * q_j
             force_B = R.T @ ca.reshape(self.f[:, k], 3, -1)
-            torque = inertia.torque(self.ddq_j[:, k], force_B, self.model.feet(q_j))
+            torque = inertia[k].torque(self.ddq_j[:, k], force_B, self.model.feet(q_j))
             torque -= self.model.foot_jacobians(q_j).T @ ca.vec(force_B)  # (3.14)
             share = settings.margin
             volts = ca.DM(law.volts_per_torque) * torque + ca.DM(law.volts_per_speed) * self.dq_j[:, k]
@@ -248,9 +250,9 @@ class LiteralProblem:
         subject_to(error[:3] == 0)
         subject_to(error[3] >= 0.5)
 
-    def solve(self, guess: TakeOffTrajectory, *, tolerance: float = 1e-4, max_iterations: int = 500) -> LiteralSolution:
-        """Return the optimum near ``guess``."""
-        self._set_initial(guess)
+    def solve(self, *, tolerance: float = 1e-4, max_iterations: int = 500) -> LiteralSolution:
+        """Return the optimum near the guess."""
+        self._set_initial(self.guess)
         options = {
             "print_level": 0,
             "sb": "yes",

@@ -57,4 +57,4 @@ def _solve(subject: Subject, motion: str) -> LiteralSolution:
     schedule = usual_schedule(motion, robot, settings)
     reference = body_reference(schedule, robot.standing_configuration(), robot, model, ik, settings)
     guess, _ = SingleRigidBody(robot, model, ik, settings, SolverOptions()).solve(schedule, reference)
-    return LiteralProblem(robot, model, settings, Variant.AAKD_STAR, schedule, reference).solve(guess)
+    return LiteralProblem(robot, model, settings, Variant.AAKD_STAR, schedule, reference, guess).solve()
