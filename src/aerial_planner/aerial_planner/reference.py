@@ -25,6 +25,7 @@ _STRETCHED_RISE = 0.25  # the same, at the most: the legs' longest way to the tu
 _FOLDING_SPEED = 0.55  # share of the no-load speed the legs may take; a short flight tucks less
 _SMOOTH_STEP_PEAK = 1.5  # greatest slope of the smooth step
 _LONG_SUPPORT = 0.4  # half the length of a support, over the height, that catches the robot by itself
+_STOPPED = 0.4  # time in which a fall is stopped, over √(h/g)
 _DROP_MAX, _DROP_STEP = 0.2, 0.02  # by which it may land lower, as a share of the height
 _REACHED = 2e-3  # [m] that feet may miss in the landing pose
 _PUSHED = 0.3  # share of the take-off that it lasts at lift-off speed, on average
@@ -110,7 +111,11 @@ def body_reference(
     lift_off = com_0 + [0.0, 0.0, _LIFT_OFF_RISE * height]
     velocity = (landing_com - lift_off) / T + [0.0, 0.0, 0.5 * GRAVITY * T]
     R_landing = rotation.matrix(schedule.landing_orientation)
-    lead = _landing_lead(landing_feet @ R_landing.T, height, landing_com - lift_off, schedule, settings)
+    inertia = np.asarray(model.inertia(robot.poses["home"]))
+    turning_on = R_landing @ inertia @ R_landing.T @ schedule.rotation * (1 - schedule.rotation_at_lift_off) / T
+    lead = _landing_lead(
+        landing_feet @ R_landing.T, height, landing_com - lift_off, turning_on / robot.mass, schedule, settings
+    )
     fall = 0.5 * GRAVITY * T - (landing_com - lift_off)[2] / T
     turning, ready = _turning_knots(schedule.flight_knots)
     share = 1 - ready / schedule.flight_knots  # of the flight, in which the feet are drawn up
@@ -124,7 +129,6 @@ def body_reference(
     turned, turn_rate = _turn(schedule, s[:, 0])
     turn = rotation.exp(turned[:, None] * schedule.rotation)
     R = rotation.matrix(rotation.multiply(turn, quaternion))
-    inertia = np.asarray(model.inertia(robot.poses["home"]))
     omega = turn_rate[:, None] * schedule.rotation
     alpha = np.einsum("kab,bc,kdc,kd->ka", R, inertia, R, omega)
     flight_turned = turned[-1] + (1 - turned[-1]) * np.linspace(0.0, 1.0, schedule.flight_knots + 1)
@@ -155,33 +159,49 @@ def _landing_stance(robot: Robot, model: BaseFrameModel) -> tuple[np.ndarray, fl
 
 
 def _landing_lead(
-    feet: np.ndarray, height: float, way: np.ndarray, schedule: Schedule, settings: PlannerSettings
+    feet: np.ndarray,
+    height: float,
+    way: np.ndarray,
+    momentum: np.ndarray,
+    schedule: Schedule,
+    settings: PlannerSettings,
 ) -> np.ndarray:
-    """Return how far ``(3,)`` [m] the support is set ahead of the centre of mass at touchdown.
+    """Return how far ``(3,)`` [m] the support is set off the centre of mass at touchdown.
 
     A support that is long for the height catches the robot where it lands, a little ahead. A short one has to be where
     the robot comes to rest: a force along the line from support to centre of mass that stops the fall w also takes
     w ℓ / h of the speed v, and as an inverted pendulum the rest would carry it √(h/g) times as far: with both,
-    ℓ = v √(h/g) / (1 + w / √(g h)).
+    ℓ = v √(h/g) / (1 + w / √(g h)). What stops the fall also stops a turn α about a level axis, if it acts off the centre
+    of mass by α × e_z / P, P = m (w + g t) with t the time the stop takes.
 
     Args:
         feet: ``(n_c, 3)`` [m] from the centre of mass, in S.
         height: of the centre of mass [m].
         way: of the centre of mass from standing to over the landing place ``(3,)`` [m].
+        momentum: about the centre of mass at touchdown, over the mass ``(3,)``, in S [m²/s].
         schedule: of the motion.
         settings: of the planner.
     """
     distance, T = float(np.hypot(way[0], way[1])), schedule.flight_time
+    fall, slow = abs(way[2] / T - 0.5 * GRAVITY * T), np.sqrt(GRAVITY * height)
+    aside = np.cross(momentum, [0.0, 0.0, 1.0]) / (fall + _STOPPED * slow)
+    lead = min(1.0, 2 * _falling(feet, height, aside)) * aside
     if distance < _NEARBY:
-        return np.zeros(3)
+        return lead
     direction = np.array([way[0], way[1], 0.0]) / distance
-    half = float(np.ptp(feet @ direction)) / 2
-    falling = np.clip(1 - half / (_LONG_SUPPORT * height), 0.0, 1.0)
-    fall = abs(way[2] / T - 0.5 * GRAVITY * T)
-    stopping = np.sqrt(height / GRAVITY) / (1 + fall / np.sqrt(GRAVITY * height))
+    stopping = height / slow / (1 + fall / slow)
     little = settings.landing_lead * distance / T
     far = stopping * distance / (T + _PUSHED * schedule.take_off_time + stopping)
-    return (little + falling * max(far - little, 0.0)) * direction
+    return lead + (little + _falling(feet, height, direction) * max(far - little, 0.0)) * direction
+
+
+def _falling(feet: np.ndarray, height: float, direction: np.ndarray) -> float:
+    """Return to what extent a robot would fall over its feet ``(n_c, 3)`` [m] in a direction ``(3,)``: 0 to 1."""
+    length = float(np.linalg.norm(direction))
+    if length < _NEARBY:
+        return 0.0
+    half = float(np.ptp(feet @ direction)) / 2 / length
+    return float(np.clip(1 - half / (_LONG_SUPPORT * height), 0.0, 1.0))
 
 
 class _Landing(NamedTuple):
@@ -208,7 +228,7 @@ def _landing(
     μ / (1 + μ) of the fall at once, and throws a robot with straight legs or strong gears off the ground. So the feet
     are drawn up at that part of the fall when they touch the ground, evenly faster in the last ``share`` of the flight.
     Legs that do not reach so far ahead, or are too straight to be drawn up so fast, let the centre of mass come down
-    lower.
+    lower: as little as will do, or where they need to be least fast if nothing will.
     """
     up = np.array([0.0, 0.0, 1.0])
     depths = np.arange(0.0, _DROP_MAX, _DROP_STEP) * height
@@ -220,10 +240,13 @@ def _landing(
     relative = [np.asarray(model.feet(q) - ca.repmat(model.com(q), 1, len(feet))).T for q in poses]
     missing = np.linalg.norm(np.array(relative) - targets, axis=2).max(axis=1)
     low, high = robot.planning_range
-    supple = np.all((low <= reaches) & (reaches <= high), axis=1)
-    supple &= np.all(np.abs(rates) <= _FOLDING_SPEED * robot.actuators.no_load_speed, axis=1)
+    haste = np.max(np.abs(rates) / (_FOLDING_SPEED * robot.actuators.no_load_speed), axis=1)
+    supple = np.all((low <= reaches) & (reaches <= high), axis=1) & (haste <= 1.0)
     reached = missing < _REACHED
-    best = int(next((np.argmax(fit) for fit in (reached & supple, reached) if fit.any()), np.argmin(missing)))
+    if np.any(reached & supple):
+        best = int(np.argmax(reached & supple))
+    else:
+        best = int(np.argmin(np.where(reached, haste, np.inf)) if reached.any() else np.argmin(missing))
     return _Landing(np.clip(reaches[best], low, high), poses[best], float(depths[best]))
 
 
