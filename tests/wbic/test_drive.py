@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -130,3 +132,17 @@ def test_a_command_is_always_finite(gains, drive, state_at):
     command = drive.command(torque, np.zeros(len(state.v)), measured(state))
     assert not command.torque.any()
     assert np.all(command.damping == gains.stop_damping)
+
+
+def test_no_joint_is_led_into_its_stop(robot, gains, drive, state_at):
+    """A reference that goes on where the joint cannot asks the motor for torque in vain."""
+    state = state_at(0)
+    lower, upper = robot.model.lowerPositionLimit[7:], robot.model.upperPositionLimit[7:]
+    for position, allowed in ((lower, [0.0, 9.0]), (upper, [-9.0, 0.0]), (0.5 * (lower + upper), [-9.0, 9.0])):
+        v_ref, still = np.zeros((2, robot.model.nv))
+        measurement = dataclasses.replace(measured(state), joint_position=position)
+        for wanted, expected in zip((-9.0, 9.0), allowed, strict=True):
+            v_ref[JOINT_VELOCITY] = wanted
+            drive.off_stops(v_ref, measurement)
+            still[JOINT_VELOCITY] = expected
+            np.testing.assert_array_equal(v_ref, still)

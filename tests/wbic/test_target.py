@@ -55,6 +55,20 @@ def test_a_hold_begins_where_and_as_the_robot_moves(state_at, hold_of, seed):
     np.testing.assert_allclose(body.angular_velocity, state.R_WB @ state.v[BASE_ANGULAR], atol=1e-9)
 
 
+def test_a_robot_that_lands_low_rises_no_faster_after_a_higher_fall(state_at, hold_of):
+    """The course of the height is that of the fall, caught, plus one that depends on how low the robot is alone."""
+    rises = []
+    for fall in (0.0, 2.0):
+        state = state_at(moving=False)
+        state.com_velocity[:] = [0.0, 0.0, -fall]
+        low, level = (hold_of(state, height=state.com[2] - support_centre(state)[2] + d) for d in (0.1, 0.0))
+        times = np.linspace(2.0, 3.0, 11)
+        rises.append([low.at(t, state).body.com[2].copy() - level.at(t, state).body.com[2] for t in times])
+    np.testing.assert_allclose(rises[1], rises[0], atol=1e-9)
+    assert rises[0][0] == pytest.approx(0.0, abs=1e-9)
+    assert rises[0][-1] == pytest.approx(0.1, abs=1e-3)
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_a_supported_acceleration_is_one_that_the_contact_points_give_without_turning_the_body(state_at, seed):
     state = state_at(seed, moving=False)

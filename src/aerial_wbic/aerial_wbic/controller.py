@@ -97,6 +97,7 @@ class Controller:
         if not isinstance(target, WholeBodyTarget):
             return self._drive.resting(target, measurement)
         vdot_cmd, v_ref = self._accelerations(state, target)
+        self._drive.off_stops(v_ref, measurement)
         wish = state, vdot_cmd, target.force, target.contact
         solution = self._qp.solve(*wish)
         self._fallback_ticks += not solution.solved

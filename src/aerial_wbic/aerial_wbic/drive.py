@@ -8,11 +8,13 @@ import numpy as np
 
 from aerial_model.actuator import ActuatorLaw
 from aerial_model.compiled import compiled, friction_of, torque_bounds_of, voltage_of
-from aerial_model.robot import JOINT_VELOCITY, Robot
+from aerial_model.robot import JOINT_POSITION, JOINT_VELOCITY, Robot
 from aerial_model.state import Command, Measurement
 from aerial_wbic.gains import ControllerGains
 from aerial_wbic.qp import Room
 from aerial_wbic.target import PostureTarget
+
+_TO_STOP = 0.01  # [s] in which no joint is to reach its stop
 
 
 class _Law(NamedTuple):
@@ -47,10 +49,16 @@ class Drive:
         self._arms = robot.arms
         self._legs = np.setdiff1d(np.arange(robot.n_joints), robot.arms)
         n = robot.n_joints
+        model = robot.model
+        self._stops = model.lowerPositionLimit[JOINT_POSITION].copy(), model.upperPositionLimit[JOINT_POSITION].copy()
         self._zeros = np.zeros(n)
         self._posture_stiffness = np.full(n, gains.posture_stiffness)
         self._stop_damping = np.full(n, gains.stop_damping)
         self.saturated_ticks = 0
+
+    def off_stops(self, v_ref: np.ndarray, measurement: Measurement) -> None:
+        """Take from q̇_ref ``(nv,)`` what would run joints into their stops: there is no going on, only torque in vain."""
+        _off_stops(v_ref[JOINT_VELOCITY], measurement.joint_position, *self._stops)
 
     def exceeds(self, torque: np.ndarray, v_ref: np.ndarray, measurement: Measurement) -> bool:
         """Return whether a torque ``(n,)`` [N·m] of a joint that can bear load leaves its room; the rest as for ``room``."""
@@ -103,6 +111,13 @@ class Drive:
             state_time=measurement.time,
             state_sequence=measurement.sequence,
         )
+
+
+@compiled
+def _off_stops(velocity: np.ndarray, position: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> None:
+    for j in range(len(velocity)):
+        slowest, fastest = (lower[j] - position[j]) / _TO_STOP, (upper[j] - position[j]) / _TO_STOP
+        velocity[j] = max(min(velocity[j], max(fastest, 0.0)), min(slowest, 0.0))
 
 
 @compiled

@@ -101,8 +101,10 @@ class Hold:
 
     All contact points are taken to be on the ground. The way to rest is one of the centre of mass *relative to the
     centre of its support* and of the attitude, from how the robot moves at the beginning: neither an early nor a late
-    touchdown makes the error jump. Joints that are free to do so go to a pose. A fall is caught within a given depth, and forward speed as fast: only while the feet
-    bear that load do friction and the length of the support let them. A rotation is caught within a given angle.
+    touchdown makes the error jump. Joints that are free to do so go to a pose. A fall is caught within a given
+    depth below the height it comes at, and forward speed as fast: only while the feet bear that load do friction and the
+    length of the support let them. To the height to stand at the robot rises at its own rate, whatever the fall: the
+    faster it rose, the less the feet would bear afterwards. A rotation is caught within a given angle.
 
     Args:
         state: of the robot at the beginning.
@@ -134,9 +136,11 @@ class Hold:
         level = rotation.about_z(rotation.heading(state.base_orientation))
         tilt = rotation.log(rotation.multiply(state.base_orientation, rotation.conjugate(level)))
         spin = state.R_WB @ state.v[BASE_ANGULAR]
+        low = np.array([0.0, 0.0, offset[2] - com_height])  # by which it is below where it is to stand
         self._course = _Course(
             begin=time,
-            offset=settling(offset, velocity, self._rest, max(rate, REACH * abs(velocity[2]) / depth)),
+            offset=settling(offset - low, velocity, self._rest, max(rate, REACH * abs(velocity[2]) / depth)),
+            rise=settling(low, np.zeros(3), np.zeros(3), rate),
             tilt=settling(tilt, spin, np.zeros(3), max(rate, REACH * float(np.linalg.norm(spin)) / turn)),
             level=level,
             joints=settling(state.q[JOINT_POSITION], state.v[JOINT_VELOCITY], pose, rate),
@@ -159,6 +163,7 @@ class _Course(NamedTuple):
 
     begin: float  # [s]
     offset: Settling  # [m]
+    rise: Settling  # to the height to stand at, besides [m]
     tilt: Settling  # rotation vector in W [rad]
     level: np.ndarray  # (4,)
     joints: Settling  # [rad]
@@ -175,8 +180,11 @@ def _resting(n: int, n_c: int, gains: BodyGains) -> WholeBodyTarget:
 def _held(course: _Course, time: float, state: Configuration, target: WholeBodyTarget) -> None:
     body = target.body
     position, attitude = body.gains
-    offset, body.com_velocity[:], acceleration = settled(course.offset, time - course.begin)
-    body.com[:] = support_centre(state) + offset
+    offset, velocity, acceleration = settled(course.offset, time - course.begin)
+    rise, rise_velocity, rise_acceleration = settled(course.rise, time - course.begin)
+    body.com[:] = support_centre(state) + offset + rise
+    body.com_velocity[:] = velocity + rise_velocity
+    acceleration += rise_acceleration
     # The base task adds its feedback to this acceleration; the sum is what the support can give.
     feedback = position.stiffness * (body.com - state.com) + position.damping * (body.com_velocity - state.com_velocity)
     total = supported(state, acceleration + feedback)
