@@ -1,6 +1,9 @@
 """Compiled stage functions: the same numbers, found again, never stale."""
 
 import dataclasses
+import subprocess
+import sys
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -87,3 +90,10 @@ def test_a_planner_without_cache_refuses_to_compile(planner):
 def test_a_cold_cache_changes_nothing(robot, forward, tmp_path):
     plan = Planner(robot, cache=tmp_path).plan(jump(0.4, 0.0)).plan
     np.testing.assert_array_equal(plan.q, forward.plan.q)
+
+
+def test_no_plan_waits_for_numba():
+    """In a process of its own: what other tests have compiled would hide it."""
+    script = Path(__file__).with_name("plans_of_everything.py")
+    process = subprocess.run([sys.executable, script], capture_output=True, text=True)
+    assert (process.returncode, process.stdout.strip()) == (0, "compiled for a plan: nothing"), process.stderr

@@ -42,6 +42,8 @@ _ROUNDING = 10 * np.finfo(float).eps  # what comparisons of large sums must forg
 class InteriorPoint:
     """One sequence of stage kinds, solved for many requests; variables are w = (x_0, u_0, x_1, u_1, …).
 
+    Requests share its memory: they come one after the other.
+
     Args:
         kinds: of each knot.
         functions_of: the functions of a kind.

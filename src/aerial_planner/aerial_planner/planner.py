@@ -216,13 +216,15 @@ class Planner:
                 )
             plan = assemble(request, self.robot, self._model, schedule, reference, take_off, self.settings)
             use = actuator_use(plan, self.robot)
-            if self._may_tighten(stage, solution, use, clock):
-                if from_a_plan:
-                    margin *= _TIGHTENING * _EXACT_SHARE / use.worst
+            miss = attitude_miss(plan, schedule)
+            tighten = self._may_tighten(stage, solution, use, clock)
+            correct = self._may_correct(miss, solution, clock)
+            if tighten and from_a_plan:
+                margin *= _TIGHTENING * _EXACT_SHARE / use.worst
+            if correct:
+                correction = correction - miss
+            if tighten or correct:
                 from_a_plan = True
-                continue
-            if self._may_correct(attitude_miss(plan, schedule), solution, clock):
-                correction = correction - attitude_miss(plan, schedule)
                 continue
             check(plan, schedule, solution, use, self.robot, self.actuator_tolerance)
             missing, reason = self._missing_height(plan)
