@@ -35,6 +35,7 @@ _CORRECTIONS, _CORRECTION_GAIN = 4, 0.99  # p_max, κ_soc of the second-order co
 _SHORTEST = 1e-7  # step length that counts as none
 _CURVATURE_FIRST, _CURVATURE_LEAST, _CURVATURE_MOST = 1e-4, 1e-20, 1e10  # δ_w of algorithm IC
 _CURVATURE_UP_FIRST, _CURVATURE_UP, _CURVATURE_DOWN = 100.0, 8.0, 1 / 3
+_CURVATURE_TRIED = 1e6  # of which a step that the filter does not accept is tried again with more
 _VIOLATION = 0.1  # of the tolerance is what constraints may be missed by: steps near the optimum are worth it
 _ROUNDING = 10 * np.finfo(float).eps  # what comparisons of large sums must forgive, as a share
 
@@ -111,7 +112,7 @@ class _Point:
     cost: float
     c: np.ndarray  # of the equalities
     gap: np.ndarray  # d − s
-    phi: float  # cost and barrier
+    logarithms: float  # of the slacks' distances to their bounds, summed
 
     @property
     def theta(self) -> float:
@@ -158,7 +159,7 @@ class _Iteration:
         options, status = self.options, "iterations exceeded"
         for iteration in range(options.max_iterations + 1):
             self._differentiate()
-            if not np.isfinite(self.point.phi):
+            if not np.isfinite(self._phi(self.point)):
                 status = "not finite"
                 break
             violation = max(_largest(self.point.c), _largest(self.point.gap))
@@ -198,7 +199,11 @@ class _Iteration:
         c = np.concatenate([self.stages.miss, self.stages.equality_miss(), w[self.fixed] - self.lower[self.fixed]])
         with np.errstate(invalid="ignore", divide="ignore"):
             logarithms = np.log(s - self.low)[self.has_low].sum() + np.log(self.high - s)[self.has_high].sum()
-        return _Point(w=w, s=s, cost=cost, c=c, gap=self._inequalities(w) - s, phi=float(cost - self.mu * logarithms))
+        return _Point(w=w, s=s, cost=cost, c=c, gap=self._inequalities(w) - s, logarithms=float(logarithms))
+
+    def _phi(self, point: _Point) -> float:
+        """Return cost and barrier."""
+        return point.cost - self.mu * point.logarithms
 
     def _differentiate(self) -> None:
         """Evaluate all derivatives at the point (at which the functions were evaluated last)."""
@@ -237,7 +242,6 @@ class _Iteration:
         while self.mu > least and self._error(self.mu) <= self.options.barrier_accuracy * self.mu:
             self.mu = max(least, min(_SLOWER * self.mu, self.mu**_FASTER))
             self.filter = []
-        self.point = self._at(self.point.w, self.point.s)
 
     # --- one step ---------------------------------------------------------------------------------------------------
 
@@ -253,9 +257,8 @@ class _Iteration:
                 self._move_multipliers(point, length, ds, lam, nu)
                 return True
             self.curvature = max(_CURVATURE_FIRST, _CURVATURE_UP * self.curvature)
-            if self.curvature > 1e6:
+            if self.curvature > _CURVATURE_TRIED:
                 return False
-            self.stages.evaluate(point.w)
             direction = self._direction(point.c, point.gap, self.curvature)
         return False
 
@@ -344,18 +347,18 @@ class _Iteration:
     def _acceptable(self, trial: _Point, length: float, descent: float) -> bool:
         """Return whether a trial is better than the point and all of the filter; enter the point into it if it must."""
         point = self.point
-        theta, phi = point.theta, point.phi
-        if not (np.isfinite(trial.theta) and np.isfinite(trial.phi)) or trial.theta > self._limits[1]:
+        theta, phi, phi_then = point.theta, self._phi(point), self._phi(trial)
+        if not (np.isfinite(trial.theta) and np.isfinite(phi_then)) or trial.theta > self._limits[1]:
             return False
-        if any(trial.theta >= a and trial.phi >= b for a, b in self.filter):
+        if any(trial.theta >= a and phi_then >= b for a, b in self.filter):
             return False
         forgiven = _ROUNDING * abs(phi)
         descends = descent < 0.0 and length * (-descent) ** _SWITCH_PHI > theta**_SWITCH_THETA
         if descends and theta <= self._limits[0]:
-            return trial.phi - phi - forgiven <= _ARMIJO * length * descent
-        if trial.theta > (1 - _THETA_MARGIN) * theta and trial.phi - phi - forgiven > -_PHI_MARGIN * theta:
+            return phi_then - phi - forgiven <= _ARMIJO * length * descent
+        if trial.theta > (1 - _THETA_MARGIN) * theta and phi_then - phi - forgiven > -_PHI_MARGIN * theta:
             return False
-        enough = descends and trial.phi - phi - forgiven <= _ARMIJO * length * descent
+        enough = descends and phi_then - phi - forgiven <= _ARMIJO * length * descent
         if not enough:
             self.filter.append(((1 - _THETA_MARGIN) * theta, phi - _PHI_MARGIN * theta))
         return True

@@ -336,14 +336,32 @@ class KinoDynamic(Formulation):
         margin: float,
         inertia: Sequence[LegInertia],
     ) -> list[StageData]:
+        knots = self._take_off_stages(schedule, reference, guess, margin, inertia)
+        return [*knots, *self._flight_stages(schedule, reference, guess)]
+
+    @property
+    def _speed(self) -> np.ndarray:
+        """Greatest joint speeds ``(n,)`` [rad/s] (3.11a)."""
+        if self.variant is Variant.KD:
+            return np.full(self.robot.n_joints, np.inf)
+        return self.settings.speed_margin * self.robot.actuators.no_load_speed
+
+    def _take_off_stages(
+        self,
+        schedule: Schedule,
+        reference: Reference,
+        guess: TakeOffTrajectory,
+        margin: float,
+        inertia: Sequence[LegInertia],
+    ) -> list[StageData]:
+        """Return the numbers of the knots on the ground, the lift-off's included."""
         robot, settings = self.robot, self.settings
-        n, N, M = robot.n_joints, len(schedule.contact), schedule.flight_knots
+        n, N = robot.n_joints, len(schedule.contact)
         low, high = robot.planning_range
         x_min = np.tile(np.concatenate([np.full(13, -np.inf), low, np.full(n, -np.inf)]), (N + 1, 1))
         x_max = np.tile(np.concatenate([np.full(13, np.inf), high, np.full(n, np.inf)]), (N + 1, 1))
         x_min[0], x_max[0] = -np.inf, np.inf  # where the robot stands is given
-        aware = self.variant is not Variant.KD
-        speed = settings.speed_margin * robot.actuators.no_load_speed if aware else np.full(n, np.inf)  # (3.11a)
+        speed = self._speed
         holding = holding_joints(self.model, schedule.contact[-1])
         x_min[N, 13 + n :], x_max[N, 13 + n :] = -speed, speed
         before = np.vstack([np.zeros(n), guess.joint_velocity[: N - 1], guess.joint_velocity[-1]])
@@ -355,7 +373,6 @@ class KinoDynamic(Formulation):
         ends = np.append(np.diff(schedule.phase) != 0, False)
         ground = np.tile(reference.foot_position, (N + 1, 1, 1))  # and above which height feet in the air must be
         ground[..., 2] += reference.foot_clearance
-        path = reference.flight_path
         stages = []
         for k in range(N):
             loaded = schedule.contact[k]
@@ -390,29 +407,45 @@ class KinoDynamic(Formulation):
                     u_max=np.concatenate(u_max),
                 )
             )
-        p = [[schedule.dt], ground[N].ravel(), [schedule.flight_time], reference.landing_com, path.parameters(0)]
-        T = [guess.flight_time]
-        arms = robot.arms
-        arm_rate = np.diff(guess.flight_joint_position[:, arms], axis=0) * M / guess.flight_time  # (M, n_a)
-        u = [guess.flight_angular_velocity[0], guess.angular_velocity[-1], arm_rate[0], T]
+        p = [schedule.dt], ground[N].ravel(), [schedule.flight_time], reference.landing_com
+        bounds = {"x_min": x_min[N], "x_max": x_max[N]}
+        return [
+            *stages,
+            self._lift_off_stage(
+                schedule, guess, np.concatenate([*p, reference.flight_path.parameters(0)]), x[N], bounds
+            ),
+        ]
+
+    def _lift_off_stage(
+        self, schedule: Schedule, guess: TakeOffTrajectory, p: np.ndarray, x: np.ndarray, bounds: dict[str, np.ndarray]
+    ) -> StageData:
+        arms, speed = self.robot.arms, self._speed
         shortest, longest = schedule.flight_time_range
+        u = [
+            guess.flight_angular_velocity[0],
+            guess.angular_velocity[-1],
+            self._arm_rates(guess)[0],
+            [guess.flight_time],
+        ]
         u_min = np.concatenate([np.full(6, -np.inf), -speed[arms], [shortest]])
         u_max = np.concatenate([np.full(6, np.inf), speed[arms], [longest]])
-        stages.append(
-            StageData(
-                p=np.concatenate(p),
-                x=x[N],
-                x_min=x_min[N],
-                x_max=x_max[N],
-                u=np.concatenate(u),
-                u_min=u_min,
-                u_max=u_max,
-            )
-        )
+        return StageData(p=p, x=x, u=np.concatenate(u), u_min=u_min, u_max=u_max, **bounds)
+
+    def _arm_rates(self, guess: TakeOffTrajectory) -> np.ndarray:
+        """Return the arms' mean rates on each interval of the flight ``(M, n_a)`` [rad/s]."""
+        steps = np.diff(guess.flight_joint_position[:, self.robot.arms], axis=0)
+        return steps * len(steps) / guess.flight_time
+
+    def _flight_stages(self, schedule: Schedule, reference: Reference, guess: TakeOffTrajectory) -> list[StageData]:
+        """Return the numbers of the knots from the first in the air to touchdown."""
+        n, M, arms, speed = self.robot.n_joints, schedule.flight_knots, self.robot.arms, self._speed
+        low, high = self.robot.planning_range
+        path, arm_rate, T = reference.flight_path, self._arm_rates(guess), [guess.flight_time]
         flight = np.hstack([guess.flight_orientation, guess.flight_joint_position])
         x_min, x_max = (np.full(8 + n + len(arms), bound) for bound in (-np.inf, np.inf))
         x_min[7 + arms], x_max[7 + arms] = low[arms], high[arms]
         bounds = {"x_min": x_min, "x_max": x_max}
+        stages = []
         for k in range(1, M + 1):
             x_k = np.concatenate([guess.angular_momentum[-1], flight[k], T, arm_rate[k - 1]])
             if k < M:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerial_model.compiled import cholesky, compiled
+from aerial_model.compiled import cholesky, cholesky_solve, compiled
 
 _RANK = 1e-9  # a pivot smaller than this share of the largest coefficient is none
 
@@ -131,25 +131,46 @@ def _minimized(R: np.ndarray, free: int, gains: np.ndarray) -> tuple:
     L = np.zeros((free, free))
     if not cholesky(R[:free, :free], L) > 0.0:
         return R, False
-    V = np.ascontiguousarray(R[:free, free:])
-    width = V.shape[1]
-    for i in range(free):
-        for j in range(i):
-            for c in range(width):
-                V[i, c] -= L[i, j] * V[j, c]
-        scale = 1.0 / L[i, i]
-        for c in range(width):
-            V[i, c] *= scale
-    P = np.ascontiguousarray(R[free:, free:]) - np.dot(V.T, V)
-    for i in range(free - 1, -1, -1):
-        for j in range(i + 1, free):
-            for c in range(width):
-                V[i, c] -= L[j, i] * V[j, c]
-        scale = 1.0 / L[i, i]
-        for c in range(width):
-            V[i, c] *= scale
-            gains[i, c] = -V[i, c]
-    return P, True
+    R_12 = np.ascontiguousarray(R[:free, free:])
+    V = R_12.copy()
+    cholesky_solve(L, V)
+    gains[:free, : V.shape[1]] = -V
+    return np.ascontiguousarray(R[free:, free:]) - np.dot(R_12.T, V), True
+
+
+@compiled
+def _conditions(C: np.ndarray, c: np.ndarray, H: np.ndarray, h: np.ndarray, step: np.ndarray, width: int) -> np.ndarray:
+    """Return what a stage's variables must satisfy, rows [·, 1] = 0, and beside each which row it is.
+
+    These are its own C y + c = 0 and, through the step to the next state, H x + h = 0.
+    """
+    own, after = len(C), len(H)
+    rows = np.zeros((own + after, width + own + after))
+    rows[:own, : width - 1] = C
+    rows[:own, width - 1] = c
+    if after > 0:
+        rows[own:, :width] = np.dot(H, step)
+        rows[own:, width - 1] += h
+    for i in range(own + after):
+        rows[i, width + i] = 1.0
+    return rows
+
+
+@compiled
+def _add_cost_to_go(R: np.ndarray, P: np.ndarray, step: np.ndarray, order: np.ndarray, N: np.ndarray) -> None:
+    """Add that of the next state, [P p], which the variables left reach by ``step`` with the first ones −N times these."""
+    x, rank, rest = len(P), len(N), len(R)
+    ordered = np.empty((x, rank + rest))
+    for i in range(x):
+        for j in range(rank + rest):
+            ordered[i, j] = step[i, order[j]]
+    reached = np.ascontiguousarray(ordered[:, rank:])
+    if rank > 0:
+        reached -= np.dot(np.ascontiguousarray(ordered[:, :rank]), N)
+    R += np.dot(reached.T, np.dot(np.ascontiguousarray(P[:, :x]), reached))
+    lead = np.dot(np.ascontiguousarray(P[:, x]), reached)
+    R[:, rest - 1] += lead
+    R[rest - 1, :] += lead
 
 
 @compiled
@@ -183,17 +204,15 @@ def _backward(
             step[:, :y] = F[k, :x_next, :y]
             step[:, y] = f[k, :x_next]
         m = own + after
-        rows = np.zeros((m, y + 1 + m))
-        if own > 0:
-            rows[:own, :y] = C[k, :own, :y]
-            rows[:own, y] = c[k, :own]
-        if after > 0:
-            rows[own:, : y + 1] = np.dot(np.ascontiguousarray(H[k + 1, :after, :x_next]), step)
-            for i in range(after):
-                rows[own + i, y] += H[k + 1, i, x_next]
-        for i in range(m):
-            rows[i, y + 1 + i] = 1.0
-
+        ahead = H[k + 1, :after, : x_next + 1] if follows else np.zeros((0, 1))
+        rows = _conditions(
+            C[max(k, 0), :own, :y],
+            c[max(k, 0), :own],
+            np.ascontiguousarray(ahead[:, :x_next]),
+            ahead[:, x_next],
+            step,
+            y + 1,
+        )
         order = np.arange(y + 1)
         rank = _reduce(rows, u, order)
         ranks[at] = rank
@@ -211,21 +230,7 @@ def _backward(
                 M[i, y] = M[y, i] = q[k, order[i]]
         R = _reduced(M, N, rank, slopes[at, :rank, :rest])
         if follows:
-            reached = np.empty((x_next, rest))  # the next state from the variables that are left
-            for i in range(x_next):
-                for j in range(rest):
-                    reached[i, j] = step[i, order[rank + j]]
-            if rank > 0:
-                eliminated = np.empty((x_next, rank))
-                for i in range(x_next):
-                    for j in range(rank):
-                        eliminated[i, j] = step[i, order[j]]
-                reached -= np.dot(eliminated, N)
-            p = np.ascontiguousarray(P[k + 1, :x_next, x_next])
-            R += np.dot(reached.T, np.dot(np.ascontiguousarray(P[k + 1, :x_next, :x_next]), reached))
-            lead = np.dot(p, reached)
-            R[:, rest - 1] += lead
-            R[rest - 1, :] += lead
+            _add_cost_to_go(R, P[k + 1, :x_next, : x_next + 1], step, order, N)
         cost, bounded = _minimized(R, u - rank, gains[at])
         if not bounded:
             return False
