@@ -125,7 +125,9 @@ class AerialNode(LifecycleNode):
 def main(make_node: Callable[[], AerialNode]) -> None:
     """Run a node as a process until SIGINT or SIGTERM; the exit status is 1 if it could not start.
 
-    A signal only asks the loop to end: rclpy's own handlers would invalidate the context under running callbacks.
+    A signal only asks the loop to end: rclpy's own handlers would invalidate the context under running callbacks. Once
+    the node is destroyed and rclpy shut down the process ends at once: in the interpreter's own end, destructors of
+    libraries race with threads of libraries, which can end a process with a segmentation fault.
     """
     asked_to_end = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -144,7 +146,9 @@ def main(make_node: Callable[[], AerialNode]) -> None:
     executor.shutdown()
     node.destroy_node()
     rclpy.shutdown()
-    sys.exit(0 if started else 1)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(0 if started else 1)
 
 
 def _claim_processor(node: AerialNode) -> None:
