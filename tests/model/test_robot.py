@@ -2,11 +2,13 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 import yaml
 
 from aerial_model.errors import ConfigurationError
-from aerial_model.robot import Robot, known_robots
+from aerial_model.robot import Robot
+from aerial_model.robot_file import known_robots
 
 MINI_CHEETAH = known_robots()["mini_cheetah"]
 
@@ -79,6 +81,9 @@ def test_a_missing_key_is_named(folder, key):
         (lambda d: d["poses"]["home"].update(hip=float("nan")), "expected finite numbers"),
         (lambda d: d["planning_range"].update(hip=[1.0, -1.0]), "must be the smaller one"),
         (lambda d: d.update(frozen_joints=["x"]), "frozen_joints: the URDF has no joint 'x'"),
+        (lambda d: d.update(held_joints=["fl_kne"]), "held_joints: the URDF has no joint 'fl_kne'.*did you mean"),
+        (lambda d: d.update(held_joints="fl_knee"), "held_joints: expected a list of joints"),
+        (lambda d: d.update(held_joints=["fl_knee"]), "joint 'fl_knee' carries contact point 'fl'"),
         (lambda d: d.update(friction_coefficient=0), "expected a positive number"),
         (lambda d: d.update(bus_voltage="24 V"), "bus_voltage: expected a positive number"),
     ],
@@ -87,6 +92,29 @@ def test_bad_data_gets_a_sentence_that_names_it(folder, change, sentence):
     edit(folder, change)
     with pytest.raises(ConfigurationError, match=sentence):
         Robot.load(folder)
+
+
+def test_a_robot_as_plans_see_it_is_the_same_with_held_joints_welded_at_home(tmp_path):
+    held = ["l_elbow", "l_shoulder_abad", "r_elbow"]
+    (tmp_path / "robot.yaml").write_text(yaml.safe_dump({"extends": "mit_humanoid", "held_joints": held}))
+    whole = Robot.load(tmp_path)
+    planned = whole.planned
+    assert set(whole.joint_names) - set(planned.joint_names) == set(held)
+    assert planned.mass == pytest.approx(whole.mass)
+    q_j = planned.poses["home"] + np.random.default_rng(0).normal(0, 0.2, planned.n_joints)
+    q = planned.standing_configuration()
+    q[7:] = q_j
+    q_whole = np.concatenate([q[:7], whole.with_held(q_j)])
+    np.testing.assert_allclose(planned.contact_positions(q), whole.contact_positions(q_whole), atol=1e-12)
+    centres = [pin.centerOfMass(r.model, r.model.createData(), x) for r, x in ((planned, q), (whole, q_whole))]
+    np.testing.assert_allclose(*centres, atol=1e-12)
+    for name, torque in zip(planned.joint_names, planned.actuators.torque_max, strict=True):
+        assert torque == whole.actuators.torque_max[whole.joint_names.index(name)]
+
+
+def test_a_robot_that_holds_nothing_is_planned_as_it_is():
+    robot = Robot.load("mit_humanoid")
+    assert robot.planned is robot
 
 
 def test_an_unknown_robot_is_answered_with_those_that_exist():

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from aerial_model.errors import ConfigurationError
-from aerial_model.robot import Robot, known_robots
+from aerial_model.robot import Robot
 from aerial_model.robot_draft import draft
+from aerial_model.robot_file import known_robots
 
 
 @pytest.fixture(params=["mini_cheetah", "mit_humanoid"])
@@ -46,6 +47,21 @@ def test_every_guess_is_marked(pair):
     text = (drafted.folder / "robot.yaml").read_text()
     for guessed in ("contact_points", "bus_voltage", "actuators", "poses"):
         assert re.search(rf"^{guessed}:.*GUESS", text, re.MULTILINE)
+
+
+def test_plans_swing_arms_and_hold_all_else_that_is_no_leg(pair):
+    known, drafted = pair
+    held = {name for name, h in zip(drafted.joint_names, drafted.held_joints, strict=True) if h}
+    arms = {known.joint_names[j] for j in known.arms}
+    assert held == {name for name in arms if "shoulder_pitch" not in name}
+
+
+def test_small_numbers_are_numbers_to_yaml(tmp_path):
+    text = (known_robots()["mini_cheetah"] / "robot.urdf").read_text()
+    urdf = tmp_path / "robot.urdf"
+    urdf.write_text(re.sub(r'effort="[\d.]+"', 'effort="0.6"', text))
+    (tmp_path / "robot.yaml").write_text(draft(urdf, "weak").text)
+    assert Robot.load(tmp_path).actuators.rotor_inertia[0] == pytest.approx(6e-8)
 
 
 def test_limits_that_say_nothing_are_replaced_and_told(tmp_path):

@@ -8,7 +8,8 @@ import pytest
 import yaml
 
 from aerial_model.plan_file import load_plan
-from aerial_model.robot import Robot, known_robots
+from aerial_model.robot import Robot
+from aerial_model.robot_file import known_robots
 
 PLAN_KEYS = {
     *("motion", "robot", "variant", "warm_start", "solver", "success", "total_time_s", "solve_time_s", "srbm_time_s"),

@@ -5,12 +5,13 @@ import dataclasses
 import numpy as np
 import pinocchio as pin
 import pytest
+import yaml
 
 from aerial_model import rotation
 from aerial_model.contact import friction_pyramid
 from aerial_model.errors import InvalidPlanError, RefusalCode, RefusalError
 from aerial_model.request import MotionRequest
-from aerial_model.robot import BASE_ORIENTATION
+from aerial_model.robot import BASE_ORIENTATION, Robot
 from aerial_model.state import Estimate
 from aerial_model.terrain import Terrain
 from aerial_planner.planner import Planner
@@ -231,6 +232,25 @@ def test_either_quaternion_of_the_start_attitude_gives_the_same_plan(planner, ro
     opposite[BASE_ORIENTATION] *= -1
     plans = [planner.plan(jump(0.3, 0.0), Estimate(time=0.0, q=start, v=np.zeros(18))).plan for start in (q, opposite)]
     np.testing.assert_allclose(plans[0].com, plans[1].com, atol=POSITION_TOLERANCE)
+
+
+def test_held_joints_stay_at_home_and_are_not_asked_for_more_than_they_can_hold(tmp_path):
+    """At the legs' usual pace the swing of the flight would take 1.2 N·m of each shoulder."""
+    shoulders, others = (
+        ["l_shoulder_pitch", "r_shoulder_pitch"],
+        ["l_shoulder_abad", "l_elbow", "r_shoulder_abad", "r_elbow"],
+    )
+    held = {"held_joints": shoulders + others, "actuators": {"shoulder_pitch": {"torque_max": 0.8}}}
+    (tmp_path / "robot.yaml").write_text(yaml.safe_dump({"extends": "mit_humanoid", **held}))
+    robot = Robot.load(tmp_path)
+    result = Planner(robot).plan(jump(0.3, 0.0))
+    plan, use = result.plan, result.actuator_use
+    np.testing.assert_array_equal(
+        plan.q[:, 7:][:, robot.held_joints], np.tile(robot.poses["home"][robot.held_joints], (len(plan.q), 1))
+    )
+    assert not plan.v[:, 6:][:, robot.held_joints].any()
+    assert use.torque_ratio.max() <= 1.05
+    assert use.torque_ratio[:, robot.joint_names.index(shoulders[0])].max() > 0.5  # it is what binds
 
 
 @pytest.mark.parametrize("variant", ["KD", "AAKD", "AAKD*"])

@@ -112,6 +112,34 @@ def test_legs_keep_to_their_range_and_speed_on_the_way(a_robot, displacement):
     assert np.all(np.abs(rate) < 0.65 * robot.actuators.no_load_speed)
 
 
+def test_legs_that_must_fold_slowly_accelerate_less(a_robot):
+    robot, model = a_robot
+    schedule, usual = jump(robot, model, GOALS[1])
+    slow = reference_of(robot, model, dataclasses.replace(schedule, folding_time=0.7 * schedule.flight_time))
+    start, rate, T = robot.poses["home"], np.full(robot.n_joints, 5.0), schedule.flight_time
+    times = np.linspace(0.0, T, 400)
+    greatest = []
+    for path in (usual.flight_path, slow.flight_path):
+        position, velocity = path.from_take_off(start, rate, times, T)
+        np.testing.assert_allclose(position[0], start)
+        np.testing.assert_allclose(velocity[0], rate)
+        np.testing.assert_allclose(position[-1], path.landing, atol=1e-9)
+        a, b = path.onset(T)
+        acceleration = np.diff(velocity, axis=0) / np.diff(times)[:, None]
+        np.testing.assert_allclose(acceleration[0], -a * rate + b / T**2 * (path.tuck - start), rtol=0.1, atol=5.0)
+        greatest.append(np.abs(acceleration[:200]).max())
+    assert greatest[1] < 0.5 * greatest[0]
+
+
+def test_the_support_is_set_farther_ahead_of_a_faster_robot(a_robot):
+    robot, model = a_robot
+    schedule, usual = jump(robot, model, GOALS[1])
+    faster = dataclasses.replace(schedule, landing_speed=usual.landing_speed + 0.5)
+    moved = usual.landing_com - reference_of(robot, model, faster).landing_com
+    assert moved[0] == pytest.approx(0.5 * usual.landing_lead_time, abs=1e-6)
+    assert (usual.landing_lead_time > 0) == (robot.name == "mit_humanoid")  # the other's feet are far apart
+
+
 def test_the_path_at_its_knots_is_what_the_problem_has(a_robot):
     robot, model = a_robot
     _, reference = jump(robot, model, GOALS[1])

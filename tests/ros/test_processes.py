@@ -11,7 +11,8 @@ import yaml
 
 from aerial_model.errors import RefusalCode, RefusalError
 from aerial_model.request import MotionRequest
-from aerial_model.robot import Robot, known_robots
+from aerial_model.robot import Robot
+from aerial_model.robot_file import known_robots
 from aerial_model.ros import qos
 from aerial_msgs.msg import ControllerStatus, MotionPlan
 from aerial_operator import client as operator_client

@@ -97,6 +97,16 @@ def test_torques_at_the_end_of_their_room_ask_for_the_share_of_the_limits(robot,
         np.testing.assert_allclose(use, gains.actuator_share)
 
 
+def test_a_joint_that_moves_little_is_led_more_softly(robot, gains):
+    """Else boards that sample would shake it: damping must not stop it within one of their periods."""
+    state = Kinematics(robot).at(robot.standing_configuration(), np.zeros(robot.model.nv))
+    inertia = 1.0 / np.diag(state.M_inv)[JOINT_VELOCITY]
+    for factor in (1.0, 100.0):
+        stiff = dataclasses.replace(gains, joint_damping=factor * gains.joint_damping)
+        damping = Drive(robot, stiff).command(np.zeros(12), np.zeros(18), measured(state)).damping
+        np.testing.assert_allclose(damping, np.minimum(stiff.joint_damping, 500.0 * inertia))
+
+
 def test_arms_beyond_their_room_are_clipped_and_do_not_count():
     """No force on the feet would help them."""
     robot = Robot.load("mit_humanoid")

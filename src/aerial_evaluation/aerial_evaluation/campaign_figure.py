@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from aerial_evaluation import figures
 from aerial_evaluation.landing import POSITION_TOLERANCE_MAX, ROTATION_TOLERANCE, TILT_MAX
 
 LANDED, FAILED = "#1f6f8b", "#c44e33"  # apart in grey and for the colour-blind too
@@ -33,8 +34,7 @@ def draw(title: str, done: Sequence[Mapping[str, Any]], groups: Sequence[Mapping
         _draw_shares(axes[0], groups)
     _draw_limits(axes[-1], done)
     figure.suptitle(title)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(file, dpi=_RESOLUTION)
+    figures.save(figure, file, _RESOLUTION)
 
 
 def _draw_shares(axes: Axes, groups: Sequence[Mapping[str, Any]]) -> None:

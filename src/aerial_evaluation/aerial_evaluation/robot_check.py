@@ -16,8 +16,9 @@ import pinocchio as pin
 
 from aerial_model.errors import AerialError
 from aerial_model.posture import crouch_depth
-from aerial_model.robot import JOINT_POSITION, JOINT_VELOCITY, Robot, find_folder
+from aerial_model.robot import JOINT_POSITION, JOINT_VELOCITY, Robot
 from aerial_model.robot_description import resolved
+from aerial_model.robot_file import find_folder
 from aerial_model.terrain import Terrain
 from aerial_planner.collision import CollisionModel
 from aerial_sim.world import build

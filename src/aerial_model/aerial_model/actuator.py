@@ -11,7 +11,7 @@ The rotor reflects as armature g_r² I_rotor; the gear adds viscous damping and 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -30,6 +30,10 @@ class ActuatorLaw:
     rotor_inertia: np.ndarray  # about the spin axis, motor side [kg·m²]
     damping: np.ndarray  # [N·m·s/rad]
     dry_friction: np.ndarray  # [N·m]
+
+    def of(self, joints: np.ndarray) -> ActuatorLaw:
+        """Return the law of some joints alone, given their indices."""
+        return ActuatorLaw(**{field.name: getattr(self, field.name)[joints] for field in fields(self)})
 
     @cached_property
     def armature(self) -> np.ndarray:

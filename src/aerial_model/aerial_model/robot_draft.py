@@ -38,6 +38,7 @@ _FLAT = 0.02  # [m] that the corners of a sole are apart at least
 _CROUCH = {True: 0.9, False: 0.7}  # leg length at home over that of the straight leg, of a biped and of others
 _FOLD, _FOLD_BIPED = 0.6, 0.7  # leg length tucked over that at home
 _ASTRIDE = 0.1  # leg lengths by which the feet of a biped that lands stand wider than at home
+_ARM = 0.15  # of the robot's mass, which an arm weighs at most
 _RANGES = 0.05  # [rad] that poses keep from stops
 
 
@@ -129,6 +130,14 @@ class _Drafter:
             "",
             f"frozen_joints: [{', '.join(frozen)}] # legs' joints that turn about other axes than the lateral one",
         ]
+        held = [names[j] for j in self._held()]
+        if held:
+            lines.append(
+                f"held_joints: [{', '.join(held)}] # GUESS: all above the legs but arms that swing fore and aft"
+            )
+            self._guesses.append(
+                "held_joints: plans leave the trunk's joints at home, and those of the arms but the first"
+            )
         return Draft(text="\n".join(lines) + "\n", guesses=tuple(self._guesses))
 
     @property
@@ -324,6 +333,24 @@ class _Drafter:
         joints = {j for limb in self._limbs for j in limb.joints if abs(self._axis(j)[1]) < 0.7}
         return sorted(self._index(j) for j in joints)
 
+    def _held(self) -> list[int]:
+        """Return the indices of the joints that plans leave alone: of limbs that do not stand, all but what swings an arm.
+
+        An arm is light and hangs, and the first of its joints that turns about the lateral axis swings all of it.
+        """
+        model = self._model
+        standing = {j for limb in self._limbs for j in limb.joints}
+        others = [j for j in range(2, model.njoints) if j not in standing]
+        light = _ARM * pin.computeTotalMass(model)
+        swings: set[int] = set()
+        for j in others:  # parents come first
+            pin.centerOfMass(model, self._data, pin.neutral(model))
+            hangs = self._data.oMi[j].act(self._data.com[j])[2] < self._data.oMi[j].translation[2]
+            lateral = abs(self._axis(j)[1]) > 0.7
+            if lateral and hangs and self._data.mass[j] < light and not swings & set(model.supports[j]):
+                swings.add(j)
+        return [self._index(j) for j in others if j not in swings]
+
     def _axis(self, joint: int) -> np.ndarray:
         """Return a joint's axis ``(3,)`` in the base with all joints at zero."""
         model = self._model
@@ -335,6 +362,12 @@ class _Drafter:
 
     def _index(self, joint: int) -> int:
         return self._model.joints[joint].idx_v - 6
+
+
+def _number(value: float) -> str:
+    """Return a number with three digits as YAML reads it: an exponent needs a point before it."""
+    text = f"{value:.3g}"
+    return text.replace("e", ".0e") if "e" in text and "." not in text else text
 
 
 def _actuator(kind: str, joints: list[str], torque: float, speed: float, damping: float, friction: float) -> list[str]:
@@ -350,7 +383,7 @@ def _actuator(kind: str, joints: list[str], torque: float, speed: float, damping
         f"    torque_constant: {constant:.4g} # [N·m/A] GUESS",
         f"    back_emf_constant: {back_emf:.6g} # [V·s/rad] no load: {speed:.4g} rad/s",
         f"    resistance: {resistance:.4g} # [Ω] GUESS: full torque up to 70 % of that",
-        f"    rotor_inertia: {_ARMATURE * torque**2 / GEAR_RATIO**2:.3g} # [kg·m²] GUESS",
-        f"    damping: {damping:.3g} # [N·m·s/rad]",
-        f"    dry_friction: {friction:.3g} # [N·m]",
+        f"    rotor_inertia: {_number(_ARMATURE * torque**2 / GEAR_RATIO**2)} # [kg·m²] GUESS",
+        f"    damping: {_number(damping)} # [N·m·s/rad]",
+        f"    dry_friction: {_number(friction)} # [N·m]",
     ]

@@ -67,6 +67,10 @@ def _micros(of: str, which: str, part: str | None = None) -> Callable[[Row], str
     return lambda row: f"{(row[of] if part is None else row[of][part])[which]:.0f} µs"
 
 
+def _momentum(part: str) -> Callable[[Row], str]:
+    return lambda row: f"{row['momentum'][part]:.2f} kg·m²/s"
+
+
 def _motion(row: Row) -> str:
     return row["motion"]
 
@@ -98,6 +102,18 @@ _TABLES = {
             "99 %": _micros("time_us", "p99"),
             "largest": _micros("time_us", "max"),
             "forces differ by": lambda row: f"{row['greatest_difference_n']:.2f} N",
+        },
+    ),
+    "arms": _Table(
+        "What arms do that nobody commands (closed loop, one run each)",
+        {
+            "motion": _motion,
+            "phase": lambda row: row["phase"],
+            "travel of a joint": lambda row: f"{row['travel_deg']:.0f}°",
+            "off the plan by": lambda row: "–" if row["off_plan_deg"] is None else f"{row['off_plan_deg']:.0f}°",
+            **{part: _momentum(part) for part in ("base", "legs", "arms")},
+            "arms' share": _ratio("share"),
+            "landed": lambda row: "yes" if row["landed"] else "no",
         },
     ),
     "tsid": _Table(

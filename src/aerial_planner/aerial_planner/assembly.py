@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,11 +15,11 @@ from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, BASE_TWIST, JOIN
 from aerial_planner.flight import integrate_flight
 from aerial_planner.reference import Reference
 from aerial_planner.schedule import GRAVITY, Schedule
-from aerial_planner.settings import PlannerSettings
 from aerial_planner.symbolic import BaseFrameModel
 from aerial_planner.trajectory import TakeOffTrajectory
 
 _FLIGHT_STEP = 0.01  # of the flight's integration and of the plan's samples there [s]
+_SAME_TIME = 1e-9  # [s]
 _STICTION_SPEED = 0.1  # smoothing of Coulomb friction in exact torques [rad/s]
 
 
@@ -31,12 +32,27 @@ class ActuatorUse:
     torque_ratio: np.ndarray  # (K-1, n) of the limit
     voltage_ratio: np.ndarray  # (K-1, n)
     speed_ratio: np.ndarray  # (K-1, n)
+    flying: np.ndarray  # (K-1,) bool
     base_wrench_error: float  # largest force the plan's accelerations would need from nowhere, as a share of the weight
 
     @property
-    def worst(self) -> float:
-        """Greatest torque or voltage over its limit."""
-        return float(max(self.torque_ratio.max(), self.voltage_ratio.max()))
+    def in_take_off(self) -> np.ndarray:
+        """Greatest torque or voltage of each joint over its limit while contacts push ``(n,)``."""
+        return self._worst[~self.flying].max(axis=0)
+
+    @property
+    def at_lift_off(self) -> np.ndarray:
+        """That of each joint as the flight begins ``(n,)``."""
+        return self._worst[self.flying][0]
+
+    @property
+    def in_flight(self) -> np.ndarray:
+        """That of each joint in flight ``(n,)``."""
+        return self._worst[self.flying].max(axis=0)
+
+    @property
+    def _worst(self) -> np.ndarray:
+        return np.maximum(self.torque_ratio, self.voltage_ratio)
 
 
 def assemble(
@@ -46,7 +62,6 @@ def assemble(
     schedule: Schedule,
     reference: Reference,
     take_off: TakeOffTrajectory,
-    settings: PlannerSettings,
 ) -> Plan:
     """Return the plan of an optimized take-off, in S.
 
@@ -78,7 +93,6 @@ def assemble(
         joint_velocity=v[-1, JOINT_VELOCITY],
         arms=robot.arms,
         arm_position=take_off.flight_joint_position[:, robot.arms],
-        settling_time=settings.settling_time,
         step=_FLIGHT_STEP,
     )
     t = flight.time[:, None]
@@ -131,6 +145,29 @@ def assemble(
     )
 
 
+def with_held_joints(plan: Plan, robot: Robot) -> Plan:
+    """Return the plan of ``robot.planned`` as one of the whole robot."""
+    if not robot.held_joints.any():
+        return plan
+    still = np.zeros((len(plan.time), robot.n_joints))
+    still[:, robot.planned_joints] = plan.v[:, JOINT_VELOCITY]
+    return dataclasses.replace(
+        plan,
+        q=np.hstack([plan.q[:, : JOINT_POSITION.start], robot.with_held(plan.q[:, JOINT_POSITION])]),
+        v=np.hstack([plan.v[:, BASE_TWIST], still]),
+        landing_joint_position=robot.with_held(plan.landing_joint_position),
+    )
+
+
+def arms_shift(plan: Plan, robot: Robot) -> np.ndarray:
+    """Return by how much ``(3,)`` [m] the arms' way to touchdown has moved the centre of mass, in S."""
+    at_home = plan.q[-1].copy()
+    at_home[JOINT_POSITION][robot.arms] = robot.poses["home"][robot.arms]
+    data = robot.model.createData()
+    centres = [pin.centerOfMass(robot.model, data, q).copy() for q in (plan.q[-1], at_home)]
+    return centres[0] - centres[1]
+
+
 def _at_knots(rates: np.ndarray) -> np.ndarray:
     """Return velocities at the knots ``(N+1, m)`` from rest, given those of Euler's steps between them, and the last."""
     velocity = np.vstack([np.zeros(rates.shape[1]), rates[1:]])
@@ -168,6 +205,7 @@ def actuator_use(plan: Plan, robot: Robot) -> ActuatorUse:
         torque_ratio=law.torque_ratio(torque),
         voltage_ratio=law.voltage_ratio(torque, speed),
         speed_ratio=law.speed_ratio(speed),
+        flying=plan.time[:-1] >= plan.take_off_time - _SAME_TIME,
         base_wrench_error=gap / (robot.mass * GRAVITY),
     )
 

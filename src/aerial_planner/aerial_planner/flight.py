@@ -39,7 +39,6 @@ def integrate_flight(
     joint_velocity: np.ndarray,
     arms: np.ndarray,
     arm_position: np.ndarray,
-    settling_time: float,
     step: float = _STEP,
 ) -> Flight:
     """Return the flight from a take-off state, by the classical Runge–Kutta rule on the quaternion.
@@ -57,13 +56,12 @@ def integrate_flight(
         joint_velocity: at take-off ``(n,)`` [rad/s].
         arms: indices of the joints that are free in flight ``(n_a,)``.
         arm_position: their positions at evenly spaced knots from take-off to touchdown ``(M+1, n_a)`` [rad].
-        settling_time: in which the legs' rates of the take-off die out [s].
         step: of the integration and of the returned samples [s], shortened so that it divides the flight.
     """
     n = max(1, round(duration / step))
     h = duration / n
     half_times = np.linspace(0.0, duration, 2 * n + 1)
-    q_j, dq_j = _legs(path, joint_position, joint_velocity, half_times, duration, settling_time)
+    q_j, dq_j = path.from_take_off(joint_position, joint_velocity, half_times, duration)
     if len(arms) > 0:
         dt = duration / (len(arm_position) - 1)
         rates = np.diff(arm_position, axis=0) / dt
@@ -131,20 +129,3 @@ def _rate(q: np.ndarray, inertia_inverse: np.ndarray, legs_momentum: np.ndarray,
         for j in range(3):
             omega[i] += inertia_inverse[i, j] * left[j]
     return omega
-
-
-def _legs(
-    path: FlightPath,
-    start: np.ndarray,
-    start_rate: np.ndarray,
-    times: np.ndarray,
-    duration: float,
-    settling_time: float,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return joint positions and rates ``(K, n)`` along the path at ``times`` ``(K,)``."""
-    position, rate = path.at(start, times, duration)
-    tau = min(settling_time, duration)
-    s = np.clip(times / tau, 0.0, 1.0)[:, None]
-    position = position + tau * s * (1 - s) ** 2 * start_rate
-    rate = rate + (1 - s) * (1 - 3 * s) * start_rate
-    return position, rate

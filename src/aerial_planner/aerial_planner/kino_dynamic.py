@@ -25,6 +25,7 @@ there are any, go where the angular momentum asks them to.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 
 import casadi as ca
@@ -43,7 +44,7 @@ from aerial_planner.knots import (
     link_slopes,
     world_feet,
 )
-from aerial_planner.reference import Reference
+from aerial_planner.reference import FlightPath, Reference
 from aerial_planner.schedule import GRAVITY, Schedule, contact_bits
 from aerial_planner.settings import PlannerSettings
 from aerial_planner.solver import SolverOptions
@@ -55,6 +56,8 @@ from aerial_planner.symbolic import (
 from aerial_planner.trajectory import TakeOffTrajectory
 from aerial_planner.transcription import Solution
 
+_UNLIMITED = 1e3  # times the limit
+
 
 class Variant(StrEnum):
     """Which actuator constraints a plan obeys (thesis section 3.1.3)."""
@@ -64,8 +67,33 @@ class Variant(StrEnum):
     AAKD_STAR = "AAKD*"  # (3.11) with the Jacobian at frozen ab/adduction
 
 
+@dataclass(frozen=True, kw_only=True)
+class Margin:
+    """Shares of torque and voltage limits that each joint may use ``(n,)``."""
+
+    take_off: np.ndarray
+    flight: np.ndarray  # of legs only as it begins
+
+    @staticmethod
+    def usual(robot: Robot, settings: PlannerSettings) -> Margin:
+        """Return the settings'; in flight only arms', which are free: others usually have torque to spare there."""
+        flight = np.full(robot.n_joints, _UNLIMITED)
+        flight[robot.planned_joints[robot.planned.arms]] = settings.margin
+        return Margin(take_off=np.full(robot.n_joints, settings.margin), flight=flight)
+
+
 class KinoDynamic(Formulation):
-    """Builds and solves the kino-dynamic problems of one robot and variant; ``timed``: phase durations are optimized."""
+    """Builds and solves the kino-dynamic problems of one robot and variant.
+
+    Args:
+        robot: the whole robot; those of its joints that plans leave at home appear only in the torque limits.
+        model: expressions of ``robot.planned``.
+        settings: of the planner.
+        variant: which actuator constraints hold.
+        options: of the solver.
+        library: compiled functions; None: interpreted ones.
+        timed: phase durations are optimized.
+    """
 
     def __init__(
         self,
@@ -78,10 +106,12 @@ class KinoDynamic(Formulation):
         *,
         timed: bool = False,
     ) -> None:
-        super().__init__(robot, model, settings, options, library)
+        super().__init__(robot.planned, model, settings, options, library)
+        self._whole = robot
         self.variant = variant
         self.timed = timed
-        self._inertia_at_home = LegInertia.at(robot, robot.poses["home"])
+        # Joints that the flight moves, or that must hold on while others move: their torques are limited all the way.
+        self._upper = np.union1d(robot.planned_joints[self.robot.arms], np.flatnonzero(robot.held_joints))
 
     def solve(
         self,
@@ -90,7 +120,7 @@ class KinoDynamic(Formulation):
         guess: TakeOffTrajectory,
         *,
         near: bool = False,
-        margin: float | None = None,
+        margin: Margin | None = None,
     ) -> tuple[TakeOffTrajectory, Solution]:
         """Return the optimum near ``guess`` and the solver's account of it; check the latter before using the former.
 
@@ -99,10 +129,10 @@ class KinoDynamic(Formulation):
             reference: what (3.4) measures deviations from.
             guess: where to start.
             near: the guess is the optimum of a similar problem, and within its limits.
-            margin: share of torque and voltage limits that may be used; None: the settings'.
+            margin: shares of torque and voltage limits that may be used; None: the settings'.
         """
-        margin = self.settings.margin if margin is None else margin
-        inertia = leg_inertia_along(self.robot, guess)
+        margin = self._usual_margin if margin is None else margin
+        inertia = leg_inertia_along(self._whole, guess)
         solution = self.problem(schedule, near=near).solve(self._stages(schedule, reference, guess, margin, inertia))
         return self._trajectory(schedule, solution), solution
 
@@ -110,8 +140,8 @@ class KinoDynamic(Formulation):
         self, schedule: Schedule, reference: Reference, trajectory: TakeOffTrajectory, guess: TakeOffTrajectory
     ) -> float:
         """Return by how much ``trajectory`` misses any constraint of the problem that starts at ``guess``, SI units."""
-        inertia = leg_inertia_along(self.robot, guess)
-        stages = self._stages(schedule, reference, trajectory, self.settings.margin, inertia)
+        inertia = leg_inertia_along(self._whole, guess)
+        stages = self._stages(schedule, reference, trajectory, self._usual_margin, inertia)
         return self.problem(schedule).violation(stages)
 
     def kinds(self, schedule: Schedule) -> list[StageKind]:
@@ -141,7 +171,15 @@ class KinoDynamic(Formulation):
             return self._kinds[key]
         robot, settings = self.robot, self.settings
         n_c = robot.n_contacts
-        s = TakeOffKnot(robot, self.model, loaded, last=last, timed=self.timed, ends_phase=ends_phase)
+        s = TakeOffKnot(
+            robot,
+            self.model,
+            loaded,
+            n_whole=self._whole.n_joints,
+            last=last,
+            timed=self.timed,
+            ends_phase=ends_phase,
+        )
 
         dr = s.r - s.r_ref
         dv = s.rdot - s.rdot_ref
@@ -200,20 +238,23 @@ class KinoDynamic(Formulation):
 
     def _actuator_rows(self, rows: Rows, s: TakeOffKnot, loaded: tuple[bool, ...]) -> None:
         """Add torque and voltage limits (3.11b, c) of all joints at mid-interval, with τ of (3.14) plus the legs' inertia."""
-        robot, law, q_j = self.robot, self.robot.actuators, s.q_j_mid
+        whole, law, q_j = self._whole, self._whole.actuators, s.q_j_mid
         if self.variant is Variant.AAKD_STAR:
-            frozen = ca.DM(robot.frozen_joints.astype(float))
+            frozen = ca.DM(self.robot.frozen_joints.astype(float))
             q_j = frozen * s.q_j_frozen + (1 - frozen) * q_j
         J = self.model.foot_jacobians(q_j)  # (3 n_c, n) in B
         pushing = np.flatnonzero(loaded)
         force_B = s.R_mid.T @ ca.horzcat(*(s.force[i] for i in pushing))
         torque = s.leg_inertia.torque(s.ddq_j, force_B, self.model.feet(q_j)[:, pushing.tolist()])
+        planned = whole.planned_joints.tolist()
+        speed = ca.SX(whole.n_joints, 1)
+        speed[planned] = s.dq_j
         for column, i in enumerate(pushing):
-            torque -= J[3 * i : 3 * i + 3, :].T @ force_B[:, column]  # (3.14)
-        for joint, name in enumerate(robot.joint_names):
-            rows.between(f"{name} torque", torque[joint] / law.torque_max[joint] / s.margin, -1.0, 1.0)
-            volts = law.volts_per_torque[joint] * torque[joint] + law.volts_per_speed[joint] * s.dq_j[joint]
-            rows.between(f"{name} voltage", volts / law.bus_voltage[joint] / s.margin, -1.0, 1.0)
+            torque[planned] -= J[3 * i : 3 * i + 3, :].T @ force_B[:, column]  # (3.14)
+        for joint, name in enumerate(whole.joint_names):
+            rows.between(f"{name} torque", torque[joint] / law.torque_max[joint] / s.margin[joint], -1.0, 1.0)
+            volts = law.volts_per_torque[joint] * torque[joint] + law.volts_per_speed[joint] * speed[joint]
+            rows.between(f"{name} voltage", volts / law.bus_voltage[joint] / s.margin[joint], -1.0, 1.0)
 
     def _lift_off_kind(self, touching: tuple[bool, ...]) -> StageKind:
         """Return the knot at which the last contact ends: the ballistic path from here ends at the goal."""
@@ -221,7 +262,14 @@ class KinoDynamic(Formulation):
         if key in self._kinds:
             return self._kinds[key]
         robot = self.robot
-        s = TakeOffKnot(robot, self.model, (False,) * robot.n_contacts, in_flight=True, timed=self.timed)
+        s = TakeOffKnot(
+            robot,
+            self.model,
+            (False,) * robot.n_contacts,
+            n_whole=self._whole.n_joints,
+            in_flight=True,
+            timed=self.timed,
+        )
         rows = Rows()
         feet = world_feet(self.model, s)
         holding = robot.holding_rows(touching)
@@ -245,7 +293,7 @@ class KinoDynamic(Formulation):
             first=True,
         )
         rows.equal("momentum", flight.momentum_gap(self.model))
-        self._arm_rows(rows, flight)
+        self._onset_rows(rows, s, flight)
         # The rates at which the feet leave the ground: without them the last force could be an impulse no leg follows.
         rows.equal("momentum", s.R.T @ s.alpha - self.model.angular_momentum(s.q_j, s.omega_ground, s.dq_before))
         slip = foot_velocities(self.model, s)
@@ -284,12 +332,12 @@ class KinoDynamic(Formulation):
             )
             rows = Rows()
             rows.equal("momentum", flight.momentum_gap(self.model))
-            self._arm_rows(rows, flight)
+            limits = self._upper_rows(rows, flight)
             self._kinds[key] = rows.stage(
                 name,
                 ca.vertcat(alpha, quaternion, q_j, T, before),
                 ca.vertcat(omega, arm_rate),
-                ca.vertcat(p, quaternion_ref),
+                ca.vertcat(p, quaternion_ref, limits),
                 w.angular_velocity * ca.sumsqr(omega)
                 + w.orientation * ca.sumsqr(attitude_error(quaternion, quaternion_ref))
                 + self._arm_cost(flight),
@@ -297,15 +345,36 @@ class KinoDynamic(Formulation):
             )
         return self._kinds[key]
 
-    def _arm_rows(self, rows: Rows, flight: FlightKnot) -> None:
-        """Add torque limits of the arms in flight: of their inertia alone, as all that falls is without weight."""
-        arms, law = self.robot.arms, self.robot.actuators
-        if self.variant is Variant.KD or len(arms) == 0:
+    def _onset_rows(self, rows: Rows, s: TakeOffKnot, flight: FlightKnot) -> None:
+        """Add torque limits of all joints as the flight begins, when legs end the take-off's motion and set out to fold."""
+        if self.variant is Variant.KD:
             return
-        torque = ca.DM(self._inertia_at_home.joint[np.ix_(arms, arms)]) @ flight.arm_acceleration
-        for row, joint in enumerate(arms):
-            limit = float(law.torque_max[joint]) * self.settings.margin
-            rows.between(f"{self.robot.joint_names[joint]} torque", torque[row] / limit, -1.0, 1.0)
+        settling, folding = s.onset[0], s.onset[1] / s.flight_time**2
+        acceleration = folding * (flight.target - s.q_j) - settling * s.dq_before
+        arms = self.robot.arms.tolist()
+        if arms:
+            acceleration[arms] = flight.arm_acceleration
+        torque = ca.mtimes(s.flight_inertia, acceleration)
+        for joint, name in enumerate(self._whole.joint_names):
+            limit = float(self._whole.actuators.torque_max[joint])
+            rows.between(f"{name} torque", torque[joint] / limit / s.margin[joint], -1.0, 1.0)
+
+    def _upper_rows(self, rows: Rows, flight: FlightKnot) -> ca.SX:
+        """Add torque limits of the joints that carry no contact, in flight, if arms move; return their parameters.
+
+        All that falls is without weight: what counts is the inertia of the arms, and that of the legs, which follow
+        their path whatever the arms do: both at the guess, but for how fast the path is in a longer or shorter flight.
+        """
+        joints, n_a = self._upper, len(self.robot.arms)
+        if self.variant is Variant.KD or n_a == 0:
+            return ca.SX(0, 1)
+        inertia, margin = ca.SX.sym("H_arms", len(joints), n_a), ca.SX.sym("margin", len(joints))
+        settling, folding = ca.SX.sym("tau_settling", len(joints)), ca.SX.sym("tau_folding", len(joints))
+        torque = settling + folding / flight.flight_time**2 + ca.mtimes(inertia, flight.arm_acceleration)
+        for row, joint in enumerate(joints):
+            limit = float(self._whole.actuators.torque_max[joint]) * margin[row]
+            rows.between(f"{self._whole.joint_names[joint]} torque", torque[row] / limit, -1.0, 1.0)
+        return ca.vertcat(ca.vec(inertia), settling, folding, margin)
 
     def _arm_cost(self, flight: FlightKnot) -> ca.SX:
         """Return the cost of how arms move: without one they would jump, in flight as on the ground."""
@@ -333,11 +402,15 @@ class KinoDynamic(Formulation):
         schedule: Schedule,
         reference: Reference,
         guess: TakeOffTrajectory,
-        margin: float,
+        margin: Margin,
         inertia: Sequence[LegInertia],
     ) -> list[StageData]:
         knots = self._take_off_stages(schedule, reference, guess, margin, inertia)
-        return [*knots, *self._flight_stages(schedule, reference, guess)]
+        return [*knots, *self._flight_stages(schedule, reference, guess, margin)]
+
+    @property
+    def _usual_margin(self) -> Margin:
+        return Margin.usual(self._whole, self.settings)
 
     @property
     def _speed(self) -> np.ndarray:
@@ -351,7 +424,7 @@ class KinoDynamic(Formulation):
         schedule: Schedule,
         reference: Reference,
         guess: TakeOffTrajectory,
-        margin: float,
+        margin: Margin,
         inertia: Sequence[LegInertia],
     ) -> list[StageData]:
         """Return the numbers of the knots on the ground, the lift-off's included."""
@@ -384,7 +457,7 @@ class KinoDynamic(Formulation):
                 ground[k].ravel(),
                 reference.x_0,
                 np.zeros(n),
-                [margin],
+                margin.take_off,
                 inertia[k].parameters,
             ]
             u = [guess.angular_velocity[k], guess.joint_velocity[k], guess.force[k][loaded].ravel()]
@@ -407,13 +480,16 @@ class KinoDynamic(Formulation):
                     u_max=np.concatenate(u_max),
                 )
             )
-        p = [schedule.dt], ground[N].ravel(), [schedule.flight_time], reference.landing_com
+        path = reference.flight_path
+        p = [
+            *([schedule.dt], ground[N].ravel(), [schedule.flight_time], reference.landing_com, path.parameters(0)),
+            *(margin.flight, LegInertia.at(self._whole, guess.joint_position[-1]).joint.ravel(order="F")),
+            path.onset(schedule.flight_time),
+        ]
         bounds = {"x_min": x_min[N], "x_max": x_max[N]}
         return [
             *stages,
-            self._lift_off_stage(
-                schedule, guess, np.concatenate([*p, reference.flight_path.parameters(0)]), x[N], bounds
-            ),
+            self._lift_off_stage(schedule, guess, np.concatenate(p), x[N], bounds),
         ]
 
     def _lift_off_stage(
@@ -436,7 +512,29 @@ class KinoDynamic(Formulation):
         steps = np.diff(guess.flight_joint_position[:, self.robot.arms], axis=0)
         return steps * len(steps) / guess.flight_time
 
-    def _flight_stages(self, schedule: Schedule, reference: Reference, guess: TakeOffTrajectory) -> list[StageData]:
+    def _upper_limits(self, path: FlightPath, guess: TakeOffTrajectory, margin: Margin) -> np.ndarray:
+        """Return the parameters of ``_upper_rows`` of each flight knot ``(M, n)``, the first one's unused."""
+        M, joints, arms = len(path.fraction), self._upper, self.robot.arms
+        if self.variant is Variant.KD or len(arms) == 0:
+            return np.zeros((M, 0))
+        legs = np.setdiff1d(np.arange(self.robot.n_joints), arms)
+        dt = guess.flight_time / M
+        middle = (np.arange(M) + 0.5) * dt
+        start, T = guess.joint_position[-1], guess.flight_time
+        _, rate = path.at(start, middle, T)
+        _, both = path.from_take_off(start, guess.joint_velocity[-1], middle, T)
+        limits = []
+        for k in range(M):
+            inertia = LegInertia.at(self._whole, guess.flight_joint_position[k]).joint[joints]
+            before = max(k - 1, 0)
+            folding, total = (rate[k] - rate[before]) / dt, (both[k] - both[before]) / dt
+            torques = inertia[:, legs] @ (total - folding)[legs], inertia[:, legs] @ folding[legs] * T**2
+            limits.append(np.concatenate([inertia[:, arms].ravel(order="F"), *torques, margin.flight[joints]]))
+        return np.array(limits)
+
+    def _flight_stages(
+        self, schedule: Schedule, reference: Reference, guess: TakeOffTrajectory, margin: Margin
+    ) -> list[StageData]:
         """Return the numbers of the knots from the first in the air to touchdown."""
         n, M, arms, speed = self.robot.n_joints, schedule.flight_knots, self.robot.arms, self._speed
         low, high = self.robot.planning_range
@@ -445,11 +543,12 @@ class KinoDynamic(Formulation):
         x_min, x_max = (np.full(8 + n + len(arms), bound) for bound in (-np.inf, np.inf))
         x_min[7 + arms], x_max[7 + arms] = low[arms], high[arms]
         bounds = {"x_min": x_min, "x_max": x_max}
+        limits = self._upper_limits(path, guess, margin)
         stages = []
         for k in range(1, M + 1):
             x_k = np.concatenate([guess.angular_momentum[-1], flight[k], T, arm_rate[k - 1]])
             if k < M:
-                p = np.concatenate([path.parameters(k), reference.flight_orientation[k]])
+                p = np.concatenate([path.parameters(k), reference.flight_orientation[k], limits[k]])
                 u = np.concatenate([guess.flight_angular_velocity[k], arm_rate[k]])
                 u_min = np.concatenate([np.full(3, -np.inf), -speed[arms]])
                 stages.append(StageData.free(p=p, x=x_k, u=u, u_min=u_min, u_max=-u_min, **bounds))

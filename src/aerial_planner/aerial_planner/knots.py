@@ -27,25 +27,25 @@ class LegInertia:
         τ = (H_jj − H_jb H_bb⁻¹ H_bj) q̈_j + H_jb H_bb⁻¹ w − Jᵀ f ,   w = Σ [f_i; c_i × f_i] in B, about the base.
 
     The second term is large when contacts turn the body fast: in a roll it is a third of the ab/adduction's torque.
+    τ is that of all n joints, held ones included, q̈_j that of the n_p joints that plans move.
     """
 
-    joint: Matrix  # H_jj − H_jb H_bb⁻¹ H_bj (n, n) [kg·m²]
+    joint: Matrix  # H_jj − H_jb H_bb⁻¹ H_bj (n, n_p) [kg·m²]
     wrench_share: Matrix  # H_jb H_bb⁻¹ (n, 6), linear first
 
     @staticmethod
     def at(robot: Robot, q_j: np.ndarray) -> LegInertia:
-        """Return it for a robot with joints at ``q_j`` ``(n,)`` [rad]."""
-        q = np.concatenate([np.zeros(3), rotation.IDENTITY, q_j])
+        """Return it for a robot whose planned joints are at ``q_j`` ``(n_p,)`` [rad]."""
+        q = np.concatenate([np.zeros(3), rotation.IDENTITY, robot.with_held(q_j)])
         M = Kinematics(robot).at(q, np.zeros(robot.model.nv)).M
         share = np.linalg.solve(M[BASE_TWIST, BASE_TWIST], M[BASE_TWIST, JOINT_VELOCITY]).T
-        return LegInertia(
-            joint=M[JOINT_VELOCITY, JOINT_VELOCITY] - share @ M[BASE_TWIST, JOINT_VELOCITY], wrench_share=share
-        )
+        joint = M[JOINT_VELOCITY, JOINT_VELOCITY] - share @ M[BASE_TWIST, JOINT_VELOCITY]
+        return LegInertia(joint=joint[:, robot.planned_joints], wrench_share=share)
 
     @staticmethod
-    def symbols(n: int) -> LegInertia:
+    def symbols(n: int, n_p: int) -> LegInertia:
         """Return parameters of a knot in its place."""
-        return LegInertia(joint=ca.SX.sym("H_jj", n, n), wrench_share=ca.SX.sym("H_jb", n, 6))
+        return LegInertia(joint=ca.SX.sym("H_jj", n, n_p), wrench_share=ca.SX.sym("H_jb", n, 6))
 
     @property
     def parameters(self) -> Matrix:
@@ -58,7 +58,7 @@ class LegInertia:
         """Return the joint torques ``(n,)`` but for −Jᵀf.
 
         Args:
-            ddq_j: ``(n,)`` [rad/s²].
+            ddq_j: ``(n_p,)`` [rad/s²].
             force_B: of the contacts ``(3, n_c)`` in B [N].
             feet_B: contact points ``(3, n_c)`` in B [m].
         """
@@ -70,8 +70,9 @@ class TakeOffKnot:
     """Symbols of a take-off knot and its Euler step (3.5, 3.6).
 
     Args:
-        robot: the robot.
+        robot: the robot, as plans see it.
         model: its expressions.
+        n_whole: number of its joints, held ones included; None: as many as are planned.
         loaded: which contacts push.
         in_flight: the lift-off knot.
         last: the one before it, whose control has the rates at which the contacts end of the joints that hold them.
@@ -85,12 +86,14 @@ class TakeOffKnot:
         model: BaseFrameModel,
         loaded: Sequence[bool],
         *,
+        n_whole: int | None = None,
         in_flight: bool = False,
         last: bool = False,
         timed: bool = False,
         ends_phase: bool = False,
     ) -> None:
         n, n_c = robot.n_joints, robot.n_contacts
+        n_whole = n if n_whole is None else n_whole
         self._model = model
         self.r, self.rdot, self.alpha = (ca.SX.sym(name, 3) for name in ("r", "rdot", "alpha"))
         self.quaternion, self.q_j = ca.SX.sym("quat", 4), ca.SX.sym("q_j", n)
@@ -121,8 +124,14 @@ class TakeOffKnot:
             self.u = ca.vertcat(self.omega, self.omega_ground, self.arm_rate, self.flight_time)
             self.landing_com = ca.SX.sym("landing_com", 3)
             self.flight_p = ca.SX.sym("flight_p", FlightKnot.n_p(robot))
+            self.margin = ca.SX.sym(
+                "margin", n_whole
+            )  # share of the torque limits that the legs' flight may begin with
+            self.flight_inertia = ca.SX.sym("H_flight", n_whole, n)
+            self.onset = ca.SX.sym("onset", 2)  # see ``FlightPath.onset``
             landing = (self.flight_time_ref, self.landing_com, self.flight_p)
-            self.p = ca.vertcat(self.nominal_dt, ca.vec(self.foot_ref), *landing)
+            flight = (self.margin, ca.vec(self.flight_inertia), self.onset)
+            self.p = ca.vertcat(self.nominal_dt, ca.vec(self.foot_ref), *landing, *flight)
             return
         self.u = ca.vertcat(self.omega, self.dq_j, self.f, self.dq_end)
         if timed and ends_phase:
@@ -131,8 +140,8 @@ class TakeOffKnot:
         self.quaternion_ref, self.q_j_ref = ca.SX.sym("quat_ref", 4), ca.SX.sym("q_j_ref", n)
         self.q_j_frozen = ca.SX.sym("q_j_frozen", n)
         self.x_0 = ca.SX.sym("x_0", self.motion.numel())
-        self.margin = ca.SX.sym("margin")  # share of torque and voltage limits that may be used
-        self.leg_inertia = LegInertia.symbols(n)
+        self.margin = ca.SX.sym("margin", n_whole)  # share of torque and voltage limits that may be used
+        self.leg_inertia = LegInertia.symbols(n_whole, n)
         self.p = ca.vertcat(
             self.nominal_dt,
             self.r_ref,

@@ -58,10 +58,11 @@ class PlanLibrary:
     def __init__(self, folder: Path, robot: Robot, warn: Callable[[str], None]) -> None:
         self.folder = folder
         self._warn = warn
+        self._joints = robot.planned_joints
         self._entries: dict[bytes, list[_Entry]] = {}  # by contact schedule
         for path in _files(folder):
             try:
-                self._keep(_entry(load_plan(path, robot)))
+                self._keep(self._entry(load_plan(path, robot)))
             except InvalidPlanError as error:
                 warn(f"plan library: {path.name} is skipped: {error}")
 
@@ -77,11 +78,11 @@ class PlanLibrary:
         if not distances or min(distances) > _NEAR:
             return None
         entry = entries[int(np.argmin(distances))]
-        return _take_off(entry.plan, entry.n_knots, reference.flight_path)
+        return _take_off(entry.plan, entry.n_knots, reference.flight_path, self._joints)
 
     def add(self, plan: Plan) -> None:
         """Keep a plan, on disk too, unless nearly the same one is there; a disk that fails is told, not raised."""
-        entry = _entry(plan)
+        entry = self._entry(plan)
         others = self._entries.get(entry.contacts, [])
         if any(np.linalg.norm(entry.place - other.place) < _SPACING for other in others):
             return
@@ -93,6 +94,19 @@ class PlanLibrary:
 
     def _keep(self, entry: _Entry) -> None:
         self._entries.setdefault(entry.contacts, []).append(entry)
+
+    def _entry(self, plan: Plan) -> _Entry:
+        """Return a plan with what it is found by.
+
+        Raises:
+            InvalidPlanError: if its take-off is none that the planner could start from.
+        """
+        N = int(np.searchsorted(plan.time, plan.take_off_time - _SAME_TIME))
+        if abs(plan.time[N] - plan.take_off_time) > _SAME_TIME or plan.contact[N:].any():
+            raise InvalidPlanError(f"plan of {plan.motion}: expected a knot at take_off_time and no contact after it")
+        start = plan.start_joint_position[self._joints]
+        place = _place(plan.landing_support_centre, plan.rotation, start, plan.landing_com_height)
+        return _Entry(plan=plan, n_knots=N, place=place)
 
     def _write(self, entry: _Entry) -> None:
         """Write a plan's file, whole or not at all: another process may be reading the folder."""
@@ -119,29 +133,16 @@ def _files(folder: Path) -> list[Path]:
         raise ConfigurationError(f"plan library {folder}: cannot be read ({error.strerror})") from None
 
 
-def _entry(plan: Plan) -> _Entry:
-    """Return a plan with what it is found by.
-
-    Raises:
-        InvalidPlanError: if its take-off is none that the planner could start from.
-    """
-    N = int(np.searchsorted(plan.time, plan.take_off_time - _SAME_TIME))
-    if abs(plan.time[N] - plan.take_off_time) > _SAME_TIME or plan.contact[N:].any():
-        raise InvalidPlanError(f"plan of {plan.motion}: expected a knot at take_off_time and no contact after it")
-    place = _place(plan.landing_support_centre, plan.rotation, plan.start_joint_position, plan.landing_com_height)
-    return _Entry(plan=plan, n_knots=N, place=place)
-
-
 def _place(landing: np.ndarray, turn: np.ndarray, start: np.ndarray, height: float) -> np.ndarray:
     """Return goal and start as a point ``(6 + n,)`` in a space where 1 is far: standing heights and radians."""
     return np.concatenate([landing / height, turn, start])
 
 
-def _take_off(plan: Plan, N: int, path: FlightPath) -> TakeOffTrajectory:
-    """Return the take-off of a plan, with rates that move its knots from one to the next as the optimizer's do."""
+def _take_off(plan: Plan, N: int, path: FlightPath, joints: np.ndarray) -> TakeOffTrajectory:
+    """Return the take-off of a plan for its planned ``joints``, with rates that move its knots from one to the next as the optimizer's do."""
     knots = slice(0, N + 1)
     dt = np.diff(plan.time[knots])
-    quaternion, q_j = plan.q[knots, BASE_ORIENTATION], plan.q[knots, JOINT_POSITION]
+    quaternion, q_j = plan.q[knots, BASE_ORIENTATION], plan.q[knots, JOINT_POSITION][:, joints]
     turn = rotation.log(rotation.multiply(rotation.conjugate(quaternion[:-1]), quaternion[1:]))
     M = len(path.fraction)
     samples = [plan.sample(time) for time in np.linspace(plan.take_off_time, plan.landing_time, M + 1)]
@@ -153,7 +154,7 @@ def _take_off(plan: Plan, N: int, path: FlightPath) -> TakeOffTrajectory:
         orientation=quaternion,
         joint_position=q_j,
         angular_velocity=np.vstack([turn / dt[:, None], plan.v[N, BASE_ANGULAR]]),
-        joint_velocity=np.vstack([np.diff(q_j, axis=0) / dt[:, None], plan.v[N, JOINT_VELOCITY]]),
+        joint_velocity=np.vstack([np.diff(q_j, axis=0) / dt[:, None], plan.v[N, JOINT_VELOCITY][joints]]),
         force=plan.force[:N],
         flight_time=plan.landing_time - plan.take_off_time,
         flight_orientation=np.array([sample.q[BASE_ORIENTATION] for sample in samples]),

@@ -46,11 +46,17 @@ class FlightPath:
     reach: np.ndarray  # (n,) [rad]
     landing: np.ndarray  # (n,) [rad]
     fraction: np.ndarray  # (M,) share of the remaining way to the pose ahead covered in each interval
+    settling_time: float  # in which the legs' rates of the take-off die out [s]
 
     def parameters(self, k: int) -> np.ndarray:
         """Return share of the flight time, fraction and pose ahead of interval ``k`` as one vector ``(2 + n,)``."""
         pose = self.tuck if k < self.turning else self.reach if k < self.ready else self.landing
         return np.concatenate([[1 / len(self.fraction), self.fraction[k]], pose])
+
+    def onset(self, flight_time: float) -> tuple[float, float]:
+        """Return how the legs accelerate as a flight of T begins: by −a q̇ + b / T² (tuck − q), as (a [1/s], b [-])."""
+        folding = self.turning / len(self.fraction)
+        return 4.0 / min(self.settling_time, flight_time), 6.0 / folding**2
 
     def at_knots(self, start: np.ndarray) -> np.ndarray:
         """Return joint positions ``(M+1, n)`` [rad] at the knots, from a take-off pose."""
@@ -68,6 +74,17 @@ class FlightPath:
         ways = self.tuck - start, self.reach - self.tuck, self.landing - self.reach
         position = start + up * ways[0] + down * ways[1] + back * ways[2]
         rate = up_rate / turning * ways[0] + down_rate / (ready - turning) * ways[1] + back_rate / left * ways[2]
+        return position, rate
+
+    def from_take_off(
+        self, start: np.ndarray, start_rate: np.ndarray, time: np.ndarray, flight_time: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the same from a take-off pose that the legs leave at ``start_rate`` ``(n,)`` [rad/s], which dies out."""
+        position, rate = self.at(start, time, flight_time)
+        settling = min(self.settling_time, flight_time)
+        s = np.clip(time / settling, 0.0, 1.0)[:, None]
+        position = position + settling * s * (1 - s) ** 2 * start_rate
+        rate = rate + (1 - s) * (1 - 3 * s) * start_rate
         return position, rate
 
 
@@ -88,6 +105,8 @@ class Reference:
     landing_com_height: float  # above the landing surface, to hold after landing [m]
     landing_joint_position: np.ndarray  # (n,) [rad]
     flight_path: FlightPath
+    landing_speed: float  # over ground that the landing feet are set for [m/s]
+    landing_lead_time: float  # by how much farther ahead they are set for each m/s of it [s]
 
 
 def body_reference(
@@ -113,14 +132,15 @@ def body_reference(
     R_landing = rotation.matrix(schedule.landing_orientation)
     inertia = np.asarray(model.inertia(robot.poses["home"]))
     turning_on = R_landing @ inertia @ R_landing.T @ schedule.rotation * (1 - schedule.rotation_at_lift_off) / T
-    lead = _landing_lead(
+    lead, lead_time, speed = _landing_lead(
         landing_feet @ R_landing.T, height, landing_com - lift_off, turning_on / robot.mass, schedule, settings
     )
     fall = 0.5 * GRAVITY * T - (landing_com - lift_off)[2] / T
-    turning, ready = _turning_knots(schedule.flight_knots)
+    turning, ready = _turning_knots(schedule)
     share = 1 - ready / schedule.flight_knots  # of the flight, in which the feet are drawn up
-    landing = _landing(landing_feet + lead @ R_landing, height, fall, T, share, robot, model, ik)
-    landing_com = landing_com - lead - [0.0, 0.0, landing.drop]
+    ahead = lead + schedule.arms_shift * [1.0, 1.0, 0.0]  # of the centre of mass with the arms at home
+    landing = _landing(landing_feet + ahead @ R_landing, height, fall, T, share, robot, model, ik)
+    landing_com = landing_com - lead - [0.0, 0.0, landing.drop - schedule.arms_shift[2]]
 
     stretched = ik.solve(((feet - com_0 - [0.0, 0.0, _STRETCHED_RISE * height]) @ R)[None], q_j)[0]
     N = len(schedule.contact)
@@ -143,9 +163,13 @@ def body_reference(
         foot_clearance=_foot_clearance(schedule, settings),
         x_0=np.concatenate([com_0, np.zeros(6), quaternion, q_j]),
         landing_com=landing_com,
+        landing_speed=speed,
+        landing_lead_time=lead_time,
         landing_com_height=height,
         landing_joint_position=landing.pose,
-        flight_path=_flight_path(schedule, robot, stretched, landing, turning, ready),
+        flight_path=_flight_path(
+            schedule, robot, stretched, landing, turning, ready, max(settings.settling_time, schedule.folding_time)
+        ),
     )
 
 
@@ -165,8 +189,8 @@ def _landing_lead(
     momentum: np.ndarray,
     schedule: Schedule,
     settings: PlannerSettings,
-) -> np.ndarray:
-    """Return how far ``(3,)`` [m] the support is set off the centre of mass at touchdown.
+) -> tuple[np.ndarray, float, float]:
+    """Return how far ``(3,)`` [m] the support is set off the centre of mass at touchdown, and what that hangs on.
 
     A support that is long for the height catches the robot where it lands, a little ahead. A short one has to be where
     the robot comes to rest: a force along the line from support to centre of mass that stops the fall w also takes
@@ -181,18 +205,25 @@ def _landing_lead(
         momentum: about the centre of mass at touchdown, over the mass ``(3,)``, in S [m²/s].
         schedule: of the motion.
         settings: of the planner.
+
+    Returns:
+        the way, how much farther it would be for each m/s of the speed over ground [s], and that speed [m/s].
     """
     distance, T = float(np.hypot(way[0], way[1])), schedule.flight_time
     fall, slow = abs(way[2] / T - 0.5 * GRAVITY * T), np.sqrt(GRAVITY * height)
     aside = np.cross(momentum, [0.0, 0.0, 1.0]) / (fall + _STOPPED * slow)
     lead = min(1.0, 2 * _falling(feet, height, aside)) * aside
     if distance < _NEARBY:
-        return lead
+        return lead, 0.0, 0.0
     direction = np.array([way[0], way[1], 0.0]) / distance
     stopping = height / slow / (1 + fall / slow)
     little = settings.landing_lead * distance / T
-    far = stopping * distance / (T + _PUSHED * schedule.take_off_time + stopping)
-    return lead + (little + _falling(feet, height, direction) * max(far - little, 0.0)) * direction
+    speed = schedule.landing_speed
+    if speed is None:
+        speed = distance / (T + _PUSHED * schedule.take_off_time + stopping)
+    falling = _falling(feet, height, direction)
+    lead = lead + (little + falling * max(stopping * speed - little, 0.0)) * direction
+    return lead, falling * stopping, speed
 
 
 def _falling(feet: np.ndarray, height: float, direction: np.ndarray) -> float:
@@ -297,32 +328,54 @@ def _turn(schedule: Schedule, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return share * (time / rising) ** 2, rate * (time / rising)
 
 
-def _turning_knots(M: int) -> tuple[int, int]:
-    """Return the knots of M + 1 at which the legs are tucked, and at which they reach for the ground."""
-    turning = max(1, round(_TUCKED_AT * M))
-    return turning, max(turning + 1, round(_READY_AT * M))
+def _turning_knots(schedule: Schedule) -> tuple[int, int]:
+    """Return the knots at which the legs are tucked, and at which they reach for the ground."""
+    M = schedule.flight_knots
+    ready = max(2, round(_READY_AT * M))
+    folding = int(np.ceil(schedule.folding_time / schedule.flight_time * M))
+    return min(max(_usual_turning(M), folding), ready - 1), ready
+
+
+def _usual_turning(M: int) -> int:
+    return max(1, round(_TUCKED_AT * M))
 
 
 def _flight_path(
-    schedule: Schedule, robot: Robot, stretched: np.ndarray, landing: _Landing, turning: int, ready: int
+    schedule: Schedule,
+    robot: Robot,
+    stretched: np.ndarray,
+    landing: _Landing,
+    turning: int,
+    ready: int,
+    settling_time: float,
 ) -> FlightPath:
     """Return the path that tucks as far as the legs can fold and stretch in time."""
     reach = landing.reach
     M, dt = schedule.flight_knots, schedule.flight_time_range[0] / schedule.flight_knots
     travel = _FOLDING_SPEED * robot.actuators.no_load_speed * dt / _SMOOTH_STEP_PEAK  # per interval (n,) [rad]
     fold = robot.poses["tuck"] - reach
-    depth = 1.0  # of the tuck
+    depth = (
+        (ready - turning) / (ready - _usual_turning(M))
+    ) ** 2  # of the tuck: legs that fold slowly unfold no faster
     for way, intervals in ((reach - stretched, turning), (np.zeros_like(reach), ready - turning)):
         # |way + depth · fold| ≤ travel · intervals, joint by joint
         room = np.sign(fold) * -way + travel * intervals
         folding = np.abs(fold) > 0
-        depth = min(depth, *np.clip(room[folding] / np.abs(fold[folding]), 0.0, 1.0), 1.0)
+        depth = min(depth, *np.clip(room[folding] / np.abs(fold[folding]), 0.0, 1.0))
     tuck = reach + depth * fold
     fraction = np.zeros(M)
     for first, last, course in ((0, turning, _smooth_step), (turning, ready, _smooth_step), (ready, M, _run_up)):
         way, _ = course(np.linspace(0.0, 1.0, last - first + 1))
         fraction[first:last] = np.diff(way) / (1 - way[:-1])
-    return FlightPath(turning=turning, ready=ready, tuck=tuck, reach=reach, landing=landing.pose, fraction=fraction)
+    return FlightPath(
+        turning=turning,
+        ready=ready,
+        tuck=tuck,
+        reach=reach,
+        landing=landing.pose,
+        fraction=fraction,
+        settling_time=settling_time,
+    )
 
 
 def _smooth_step(s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -8,12 +8,14 @@ import numpy as np
 
 from aerial_model.actuator import ActuatorLaw
 from aerial_model.compiled import compiled, friction_of, torque_bounds_of, voltage_of
+from aerial_model.kinematics import Kinematics
 from aerial_model.robot import JOINT_POSITION, JOINT_VELOCITY, Robot
 from aerial_model.state import Command, Measurement
 from aerial_wbic.gains import ControllerGains
 from aerial_wbic.qp import Room
 from aerial_wbic.target import PostureTarget
 
+_FASTEST = 500.0  # [1/s] at which damping may stop a joint by itself: faster, boards that sample would shake it
 _TO_STOP = 0.01  # [s] in which no joint is to reach its stop
 
 
@@ -31,9 +33,9 @@ class _Law(NamedTuple):
     share: float  # of the limits that may be asked for
 
     @classmethod
-    def of(cls, law: ActuatorLaw, gains: ControllerGains) -> _Law:
+    def of(cls, law: ActuatorLaw, gains: ControllerGains, lightness: np.ndarray) -> _Law:
         arrays = [np.array(getattr(law, name)) for name in cls._fields[:6]]
-        damping = np.full_like(arrays[0], gains.joint_damping)
+        damping = gains.joint_damping * lightness
         return cls(*arrays, damping, gains.stiction_speed, gains.actuator_share)
 
 
@@ -45,15 +47,16 @@ class Drive:
     """
 
     def __init__(self, robot: Robot, gains: ControllerGains) -> None:
-        self._law = _Law.of(robot.actuators, gains)
+        lightness = _lightness(robot, gains.joint_damping)
+        self._law = _Law.of(robot.actuators, gains, lightness)
         self._arms = robot.arms
         self._legs = np.setdiff1d(np.arange(robot.n_joints), robot.arms)
         n = robot.n_joints
         model = robot.model
         self._stops = model.lowerPositionLimit[JOINT_POSITION].copy(), model.upperPositionLimit[JOINT_POSITION].copy()
         self._zeros = np.zeros(n)
-        self._posture_stiffness = np.full(n, gains.posture_stiffness)
-        self._stop_damping = np.full(n, gains.stop_damping)
+        self._posture_stiffness = gains.posture_stiffness * lightness
+        self._stop_damping = gains.stop_damping * lightness
         self.saturated_ticks = 0
 
     def off_stops(self, v_ref: np.ndarray, measurement: Measurement) -> None:
@@ -111,6 +114,13 @@ class Drive:
             state_time=measurement.time,
             state_sequence=measurement.sequence,
         )
+
+
+def _lightness(robot: Robot, damping: float) -> np.ndarray:
+    """Return by what share ``(n,)`` of the gains each joint is led: less where it moves too little for all of it."""
+    state = Kinematics(robot).at(robot.standing_configuration(), np.zeros(robot.model.nv))
+    inertia = 1.0 / np.diag(state.M_inv)[JOINT_VELOCITY]  # with all others free [kg·m²]
+    return np.minimum(1.0, _FASTEST * inertia / max(damping, np.finfo(float).tiny))
 
 
 @compiled

@@ -51,7 +51,7 @@ def _figures(solutions: list[LiteralSolution]) -> Row:
 
 def _solve(subject: Subject, motion: str) -> LiteralSolution:
     """Return the literal solution of the motion's usual request, built anew as the thesis's is."""
-    robot, settings = subject.robot, subject.planner.settings
+    robot, settings = subject.robot.planned, subject.planner.settings
     model = base_frame_model(robot)
     ik = InverseKinematics(robot, model)
     schedule = usual_schedule(motion, robot, settings)

@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from aerial_evaluation import figures
 from aerial_evaluation.bench.samples import Row, Sample, measure
 from aerial_evaluation.bench.subject import Subject, usual_request
 from aerial_evaluation.bench.violations import violations
-from aerial_model.errors import ConfigurationError
 from aerial_model.plan import Plan
 from aerial_model.robot import Robot
 from aerial_planner.kino_dynamic import Variant
@@ -74,11 +74,7 @@ def draw(results: Mapping[Variant, PlanningResult], robot: Robot, file: Path) ->
     figure.align_ylabels()
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=len(handles), frameon=False, fontsize="small")
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(file, dpi=_RESOLUTION)
-    except OSError as error:
-        raise ConfigurationError(f"{file}: cannot be written ({error.strerror})") from None
+    figures.save(figure, file, _RESOLUTION)
 
 
 def _joint_kinds(robot: Robot) -> dict[str, list[int]]:

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from aerial_evaluation import figures
+
 _COLOUR = "#1f6f8b"
 _RESOLUTION = 200  # [1/in]
 
@@ -30,5 +32,4 @@ def draw(rows: Sequence[Mapping[str, Any]], file: Path) -> None:
     ahead.plot([row["distance_m"] for row in raised], [row["height_m"] for row in raised], "o-", color=_COLOUR)
     ahead.set(xlabel="distance of the landing ahead [m]", ylabel="height of the platform [m]", ylim=(0.0, None))
     ahead.grid(alpha=0.3)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(file, dpi=_RESOLUTION)
+    figures.save(figure, file, _RESOLUTION)

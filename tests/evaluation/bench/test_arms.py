@@ -1,0 +1,31 @@
+"""What arms do in a spin of the humanoid, and in one of a robot that has none."""
+
+import pytest
+
+from aerial_evaluation.bench.controller import SECTIONS
+from aerial_evaluation.bench.planner import measured
+from aerial_evaluation.bench.subject import Subject
+from aerial_model.robot import Robot
+
+
+def rows_of(robot, folder):
+    subject = Subject(robot=Robot.load(robot), motions=("spin",), folder=folder)
+    return list(measured(subject, ("arms",), SECTIONS))
+
+
+def test_arms_swing_as_planned_and_carry_a_part_of_the_angular_momentum(tmp_path):
+    take_off, flight, landing = rows = rows_of("mit_humanoid", tmp_path)
+    assert [row["phase"] for row in rows] == ["take-off", "flight", "landing"]
+    assert all(row["landed"] for row in rows)
+    for row in rows:
+        assert row["share"] == pytest.approx(row["momentum"]["arms"] / sum(row["momentum"].values()))
+        assert 0.0 < row["share"] < 0.2  # two arms of 2.8 kg
+    for row in (take_off, flight):
+        assert row["travel_deg"] > 3.0
+        assert row["off_plan_deg"] < 5.0
+    assert landing["off_plan_deg"] is None  # the plan ends with touchdown
+    assert (tmp_path / "arms_spin.png").stat().st_size > 10_000
+
+
+def test_a_robot_without_arms_has_no_rows(tmp_path):
+    assert rows_of("mini_cheetah", tmp_path) == []
