@@ -26,6 +26,7 @@ def path(robot, tuck="tuck"):
         reach=robot.poses["landing"] + (0.0 if tuck == "home" else 0.1),
         landing=robot.poses["landing"],
         fraction=np.zeros(16),
+        settling_time=0.08,
     )
 
 
@@ -40,7 +41,6 @@ def fly(robot, model, alpha, *, tuck="tuck", step=0.005, rate=0.0):
         joint_velocity=np.full(12, rate),
         arms=robot.arms,
         arm_position=np.zeros((17, 0)),
-        settling_time=0.08,
         step=step,
     )
 
@@ -94,7 +94,6 @@ def test_arms_go_through_their_knots_from_the_rates_they_leave_the_ground_with()
         joint_velocity=rates,
         arms=arms,
         arm_position=knots,
-        settling_time=0.08,
     )
     np.testing.assert_allclose(flight.joint_velocity[0, arms], 2.0)
     np.testing.assert_allclose(flight.joint_position[0, arms], knots[0])

@@ -5,7 +5,8 @@ import pytest
 
 from aerial_model.request import MotionRequest
 from aerial_planner.inverse_kinematics import InverseKinematics
-from aerial_planner.kino_dynamic import KinoDynamic, Variant
+from aerial_planner.kino_dynamic import KinoDynamic
+from aerial_planner.limits import Variant
 from aerial_planner.reference import body_reference
 from aerial_planner.schedule import contact_schedule, load_motion
 from aerial_planner.settings import PlannerSettings

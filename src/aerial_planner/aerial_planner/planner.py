@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -17,18 +17,20 @@ from aerial_model.request import MotionRequest
 from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, JOINT_POSITION, Robot
 from aerial_model.state import Estimate
 from aerial_planner import flight, interior_point
-from aerial_planner.assembly import ActuatorUse, actuator_use, arms_shift, assemble, with_held_joints
+from aerial_planner.assembly import ActuatorUse, actuator_use, assemble, with_held_joints
+from aerial_planner.attempt import Attempt, Outcome
 from aerial_planner.checks import (
     ACTUATOR_TOLERANCE,
     VIOLATION_TOLERANCE,
-    attitude_miss,
     check,
     clearance_deficit,
 )
 from aerial_planner.collision import CollisionModel
 from aerial_planner.compiled import FunctionLibrary
 from aerial_planner.inverse_kinematics import InverseKinematics
-from aerial_planner.kino_dynamic import KinoDynamic, Margin, Variant
+from aerial_planner.kino_dynamic import KinoDynamic
+from aerial_planner.knots import LegInertia
+from aerial_planner.limits import Margin, Variant
 from aerial_planner.plan_library import PlanLibrary
 from aerial_planner.reference import Reference, body_reference
 from aerial_planner.schedule import Motion, Schedule, contact_schedule, load_motion
@@ -44,13 +46,6 @@ from aerial_planner.transcription import Solution
 _TOLERANCE = 3e-4  # of the optimum: tighter ones cost two iterations and gain a hundred-thousandth of the cost
 _ITERATIONS_MAX = 50  # of one solve: those that succeed take 10 to 40
 _ITERATIONS_OF_REQUEST = 100  # after which nothing else is tried, so that a refusal takes no longer than a plan
-_EXACT_SHARE = 0.95  # of the limits is what exact torques may take; the rest is the controller's
-_ROUNDS, _LAST_SHARE = 3, 1.03  # after so many attempts this share is good enough
-_TIGHTENING = 0.98  # by which limits are lowered further than exact torques were beyond that, and folding slowed down
-_WORTH_CORRECTING = np.deg2rad(1.5)  # by which a finely integrated flight may miss its attitude [rad]
-_WORTH_MOVING = 0.015  # by which feet may be off where they should land, over the height of the centre of mass
-_CORRECTABLE = np.deg2rad(30.0)  # beyond this it is another motion [rad]
-_CUT_SHORT = 1.01  # times the shortest flight
 _TOUCH_RISE = 0.02  # [m] by which to fly higher when a link would touch the terrain
 _CLEARANCE_SPARE = 0.01  # [m] added to a miss, since the pose at the edge changes with the flight
 
@@ -109,48 +104,6 @@ class _Clock:
     started_from: str = ""  # where the last solve of the kino-dynamic stage began
 
 
-@dataclass
-class _Attempt:
-    """What is asked of the optimizer; it changes from one attempt at a request to the next."""
-
-    margin: Margin
-    rounds: int = 0  # of judging exact torques
-    least_rise: float = 0.0  # of the flight [m]
-    folding_time: float = 0.0  # see ``Schedule`` [s]
-    arms_shift: np.ndarray = field(default_factory=lambda: np.zeros(3))  # see ``Schedule``
-    landing_speed: float | None = None  # see ``Schedule``
-    correction: np.ndarray = field(default_factory=lambda: np.zeros(3))  # see ``Schedule``
-    take_off: TakeOffTrajectory | None = None  # that the attempt before came to
-
-    def schedule(self, usual: Schedule) -> Schedule:
-        """Return the schedule of the request with what is asked for."""
-        return replace(
-            usual,
-            correction=self.correction,
-            arms_shift=self.arms_shift,
-            landing_speed=self.landing_speed,
-            folding_time=self.folding_time,
-        )
-
-
-class _Outcome(NamedTuple):
-    """What came of an attempt."""
-
-    schedule: Schedule
-    reference: Reference
-    take_off: TakeOffTrajectory
-    solution: Solution
-    plan: Plan
-    use: ActuatorUse
-
-    @property
-    def cut_short(self) -> bool:
-        """Whether it is an optimum with a flight as short as may be: poor local ones are like that."""
-        if self.solution.max_violation > VIOLATION_TOLERANCE:
-            return False
-        return self.take_off.flight_time < _CUT_SHORT * self.schedule.flight_time_range[0]
-
-
 class Planner:
     """Plans motions of one robot; problems are built once per contact schedule and reused.
 
@@ -190,6 +143,7 @@ class Planner:
         self._model = base_frame_model(self._body)
         interior_point.rehearse()
         flight.rehearse()
+        LegInertia.at(robot, self._body.poses["home"])  # rehearsed, too
         self._ik = InverseKinematics(self._body, self._model)
         self._srbm = SingleRigidBody(self._body, self._model, self._ik, self.settings, self.options, self._library)
         self._collisions = CollisionModel(robot)
@@ -254,20 +208,20 @@ class Planner:
         stage = self._stage(request)
         motion = load_motion(request.motion, self.robot)
         q_start = self._start_configuration(start)
-        attempt = _Attempt(margin=Margin.usual(self.robot, self.settings))
-        good: _Outcome | None = None  # the last that may be handed out, should a better one not be found
+        attempt = Attempt(margin=Margin.usual(self.robot, self.settings))
+        good: Outcome | None = None  # the last that may be handed out, should a better one not be found
         start_as = request
         while True:
             outcome, again = self._outcome(start_as, stage, motion, q_start, attempt, progress, clock)
             refusal = self._refusal(outcome)
             if refusal is not None and outcome.cut_short and start_as.warm_start:
                 start_as = replace(request, warm_start=False)
-                attempt = _Attempt(margin=Margin.usual(self.robot, self.settings))
+                attempt = Attempt(margin=Margin.usual(self.robot, self.settings))
                 continue
             may_go_on = (
                 outcome.solution.max_violation <= VIOLATION_TOLERANCE and clock.iterations <= _ITERATIONS_OF_REQUEST
             )
-            if may_go_on and self._improve(attempt, stage, outcome, again=again):
+            if may_go_on and attempt.improve(outcome, self.robot, self.settings, stage.variant, again=again):
                 good = outcome if refusal is None else good
                 continue
             if refusal is not None and good is not None:
@@ -295,10 +249,10 @@ class Planner:
         stage: KinoDynamic,
         motion: Motion,
         q_start: np.ndarray,
-        attempt: _Attempt,
+        attempt: Attempt,
         progress: Progress,
         clock: _Clock,
-    ) -> tuple[_Outcome, bool]:
+    ) -> tuple[Outcome, bool]:
         """Return what comes of an attempt, and whether it started from a plan."""
         schedule = attempt.schedule(self._schedule(request, motion, attempt.least_rise))
         reference = body_reference(schedule, q_start, self._body, self._model, self._ik, self.settings)
@@ -312,71 +266,15 @@ class Planner:
             take_off, solution = self._take_off(request, stage, schedule, reference, progress, clock)
         attempt.take_off = take_off
         plan = with_held_joints(assemble(request, self._body, self._model, schedule, reference, take_off), self.robot)
-        return _Outcome(schedule, reference, take_off, solution, plan, actuator_use(plan, self.robot)), again
+        return Outcome(schedule, reference, take_off, solution, plan, actuator_use(plan, self.robot)), again
 
-    def _refusal(self, outcome: _Outcome) -> RefusalError | None:
+    def _refusal(self, outcome: Outcome) -> RefusalError | None:
         """Return why a plan must not be handed out."""
         try:
             check(outcome.plan, outcome.schedule, outcome.solution, outcome.use, self.robot, self.actuator_tolerance)
         except RefusalError as refusal:
             return refusal
         return None
-
-    def _improve(
-        self,
-        attempt: _Attempt,
-        stage: KinoDynamic,
-        outcome: _Outcome,
-        *,
-        again: bool,
-    ) -> bool:
-        """Ask for what would make a plan better where the optimizer's model is not exact; return whether anything would.
-
-        Args:
-            attempt: that made the plan; it is changed.
-            stage: that optimized it.
-            outcome: the plan, and what it was made for.
-            again: the attempt started from a plan: then its legs' inertia was that of nearly the same poses.
-        """
-        plan, use, schedule, reference = outcome.plan, outcome.use, outcome.schedule, outcome.reference
-        improved = False
-        miss = attitude_miss(plan, schedule)
-        if _WORTH_CORRECTING < np.linalg.norm(miss) < _CORRECTABLE:
-            attempt.correction = attempt.correction - miss
-            improved = True
-        little = _WORTH_MOVING * plan.landing_com_height
-        shift = arms_shift(plan, self.robot)
-        if np.linalg.norm(shift - attempt.arms_shift) > little:
-            attempt.arms_shift = shift
-            improved = True
-        speed = float(np.linalg.norm(plan.com_velocity[-1, :2]))
-        if reference.landing_lead_time * abs(speed - reference.landing_speed) > little:
-            attempt.landing_speed = speed
-            improved = True
-        if stage.variant is Variant.KD:
-            return improved
-        attempt.rounds += 1
-        share = _EXACT_SHARE if attempt.rounds <= _ROUNDS else _LAST_SHARE
-        over = use.in_take_off / share
-        if np.any(over > 1.0):
-            improved = True
-            if again:
-                attempt.margin = replace(attempt.margin, take_off=_tightened(attempt.margin.take_off, over))
-        haste = np.sqrt(use.in_flight.max() / share)
-        path = reference.flight_path
-        longest = path.ready / schedule.flight_knots * schedule.flight_time
-        if haste > 1.0 and attempt.folding_time < longest:
-            folding = max(path.settling_time, path.turning / schedule.flight_knots * schedule.flight_time)
-            attempt.folding_time = min(folding * haste / _TIGHTENING, longest)
-            improved = True
-            return True
-        over = use.at_lift_off / share
-        over[self.robot.arms] = use.in_flight[self.robot.arms] / share
-        if np.any(over > 1.0):  # the legs cannot take longer: they must leave the ground slower
-            least = np.minimum(attempt.margin.flight, self.settings.margin)
-            attempt.margin = replace(attempt.margin, flight=_tightened(least, over))
-            improved = True
-        return improved
 
     def _missing_height(self, plan: Plan) -> tuple[float, str]:
         """Return by how much a plan should fly higher over the terrain [m], and why; 0 if feet and links clear it.
@@ -521,11 +419,6 @@ class Planner:
             landing_position_m=None if plan is None else plan.landing_support_centre.tolist(),
             refusal=None if refusal is None else {"code": refusal.code.value, "reason": refusal.reason},
         )
-
-
-def _tightened(margin: np.ndarray, over: np.ndarray) -> np.ndarray:
-    """Return shares of limits ``(n,)``, less where exact torques were ``over`` times what they may be."""
-    return np.where(over > 1.0, margin * _TIGHTENING / np.maximum(over, 1.0), margin)
 
 
 def _position(request: MotionRequest) -> str:

@@ -21,7 +21,7 @@ from aerial_evaluation.bench.subject import Subject
 from aerial_evaluation.bench.violations import violations
 from aerial_model.request import LOWER_MARGIN, UPPER_MARGIN, MotionRequest
 from aerial_model.robot import Robot
-from aerial_planner.kino_dynamic import Variant
+from aerial_planner.limits import Variant
 from aerial_planner.planner import Planner
 from aerial_planner.schedule import load_motion
 

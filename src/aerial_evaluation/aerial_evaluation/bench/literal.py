@@ -5,7 +5,7 @@ from __future__ import annotations
 from aerial_evaluation.bench.samples import Row, measure, percentiles, summary
 from aerial_evaluation.bench.subject import Subject, usual_request, usual_schedule
 from aerial_planner.inverse_kinematics import InverseKinematics
-from aerial_planner.kino_dynamic import Variant
+from aerial_planner.limits import Variant
 from aerial_planner.reference import body_reference
 from aerial_planner.solver import SolverOptions
 from aerial_planner.srbm import SingleRigidBody

@@ -12,7 +12,7 @@ import numpy as np
 from aerial_model.errors import ConfigurationError
 from aerial_model.request import MotionRequest
 from aerial_model.robot import Robot
-from aerial_planner.kino_dynamic import Variant
+from aerial_planner.limits import Variant
 from aerial_planner.planner import Planner
 from aerial_planner.schedule import Schedule, contact_schedule, known_motions, load_motion
 from aerial_planner.settings import PlannerSettings

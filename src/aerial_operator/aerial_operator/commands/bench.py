@@ -18,7 +18,7 @@ from aerial_operator.bench_tables import tables
 from aerial_operator.console import Report, UsageError, say, to_json
 from aerial_operator.planning import compile_functions
 from aerial_planner.compiled import default_cache
-from aerial_planner.kino_dynamic import Variant
+from aerial_planner.limits import Variant
 
 SECTIONS = {"planner": planner.SECTIONS, "controller": controller.SECTIONS}
 PEERS = {peer.name: peer for peer in (crocoddyl_peer.PEER, tsid_peer.PEER)}  # by the section that compares with it
