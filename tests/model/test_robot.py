@@ -83,6 +83,7 @@ def test_a_missing_key_is_named(folder, key):
         (lambda d: d.update(frozen_joints=["x"]), "frozen_joints: the URDF has no joint 'x'"),
         (lambda d: d.update(held_joints=["fl_kne"]), "held_joints: the URDF has no joint 'fl_kne'.*did you mean"),
         (lambda d: d.update(held_joints="fl_knee"), "held_joints: expected a list of joints"),
+        (lambda d: d.update(frozen_joints=["fl_hip", "fl_hip"]), "joint 'fl_hip' is listed twice"),
         (lambda d: d.update(held_joints=["fl_knee"]), "joint 'fl_knee' carries contact point 'fl'"),
         (lambda d: d.update(friction_coefficient=0), "expected a positive number"),
         (lambda d: d.update(bus_voltage="24 V"), "bus_voltage: expected a positive number"),

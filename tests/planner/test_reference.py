@@ -140,6 +140,21 @@ def test_the_support_is_set_farther_ahead_of_a_faster_robot(a_robot):
     assert (usual.landing_lead_time > 0) == (robot.name == "mit_humanoid")  # the other's feet are far apart
 
 
+def test_arms_that_shift_the_centre_of_mass_leave_the_feet_where_they_are_to_land(a_robot):
+    """``landing_com`` is that with the arms where they are; the legs reach out so that it is as far behind the feet as usual."""
+    robot, model = a_robot
+    schedule, usual = jump(robot, model, GOALS[1])
+    shift = np.array([0.02, 0.0, 0.015])
+    shifted = reference_of(robot, model, dataclasses.replace(schedule, arms_shift=shift))
+    relative = [
+        (np.asarray(model.feet(pose)) - np.asarray(model.com(pose))).mean(axis=1)
+        for pose in (usual.landing_joint_position, shifted.landing_joint_position)
+    ]
+    feet = usual.landing_com + relative[0], shifted.landing_com - shift + relative[1]
+    np.testing.assert_allclose(*feet, atol=5e-3)
+    assert shifted.landing_com[0] == pytest.approx(usual.landing_com[0], abs=1e-9)
+
+
 def test_the_path_at_its_knots_is_what_the_problem_has(a_robot):
     robot, model = a_robot
     _, reference = jump(robot, model, GOALS[1])

@@ -113,7 +113,7 @@ class _Drafter:
             lines.append(f"fixed_joints: [{', '.join(self._fixed)}]")
         lines += ["", "contact_points: # GUESS: the lowest ends of the limbs"]
         for point, frame, offset, radius in self._points(home):
-            at = "" if not np.any(offset) else f", offset: [{', '.join(f'{x:.4g}' for x in offset)}]"
+            at = "" if not np.any(offset) else f", offset: [{', '.join(_number(x, 4) for x in offset)}]"
             lines.append(f"  - {{name: {point}, frame: {frame}, radius: {radius:.4g}{at}}}")
         lines += [
             "",
@@ -364,9 +364,9 @@ class _Drafter:
         return self._model.joints[joint].idx_v - 6
 
 
-def _number(value: float) -> str:
-    """Return a number with three digits as YAML reads it: an exponent needs a point before it."""
-    text = f"{value:.3g}"
+def _number(value: float, digits: int = 3) -> str:
+    """Return a number with so many digits as YAML reads it: an exponent needs a point before it."""
+    text = f"{value:.{digits}g}"
     return text.replace("e", ".0e") if "e" in text and "." not in text else text
 
 

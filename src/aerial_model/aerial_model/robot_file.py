@@ -280,6 +280,8 @@ def _joint_mask(names: Any, joints: tuple[str, ...], where: str) -> np.ndarray:
     for name in names:
         if name not in joints:
             raise ConfigurationError(f"{where}: the URDF has no joint '{name}'{closest(str(name), joints)}")
+        if names.count(name) > 1:
+            raise ConfigurationError(f"{where}: joint '{name}' is listed twice")
     mask = np.array([joint in names for joint in joints])
     mask.flags.writeable = False
     return mask
@@ -289,6 +291,8 @@ def _held_joints(
     names: Any, joints: tuple[str, ...], model: pin.Model, points: tuple[ContactPoint, ...], where: str
 ) -> np.ndarray:
     mask = _joint_mask(names, joints, where)
+    if mask.all():
+        raise ConfigurationError(f"{where}: all joints are held; a plan needs some to move")
     for point in points:
         link = model.frames[model.getFrameId(point.frame, pin.FrameType.BODY)].parentJoint
         for joint in list(model.supports[link])[_FIRST_JOINT:]:

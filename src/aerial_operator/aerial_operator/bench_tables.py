@@ -105,7 +105,7 @@ _TABLES = {
         },
     ),
     "arms": _Table(
-        "What arms do that nobody commands (closed loop, one run each)",
+        "What arms do that no goal asks for (closed loop, one run each)",
         {
             "motion": _motion,
             "phase": lambda row: row["phase"],

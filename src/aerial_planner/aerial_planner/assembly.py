@@ -159,12 +159,12 @@ def with_held_joints(plan: Plan, robot: Robot) -> Plan:
     )
 
 
-def arms_shift(plan: Plan, robot: Robot) -> np.ndarray:
-    """Return by how much ``(3,)`` [m] the arms' way to touchdown has moved the centre of mass, in S."""
-    at_home = plan.q[-1].copy()
-    at_home[JOINT_POSITION][robot.arms] = robot.poses["home"][robot.arms]
+def arms_shift(plan: Plan, robot: Robot, expected: np.ndarray) -> np.ndarray:
+    """Return by how much ``(3,)`` [m] arms at touchdown that are not where ``expected`` ``(n,)`` shift the centre of mass, in S."""
+    as_expected = plan.q[-1].copy()
+    as_expected[JOINT_POSITION][robot.arms] = expected[robot.arms]
     data = robot.model.createData()
-    centres = [pin.centerOfMass(robot.model, data, q).copy() for q in (plan.q[-1], at_home)]
+    centres = [pin.centerOfMass(robot.model, data, q).copy() for q in (plan.q[-1], as_expected)]
     return centres[0] - centres[1]
 
 

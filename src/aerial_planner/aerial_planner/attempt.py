@@ -7,11 +7,12 @@ leaves out (velocity terms, the arms' part in where feet land). What that does t
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from aerial_model.plan import Plan
+from aerial_model.request import MotionRequest
 from aerial_model.robot import Robot
 from aerial_planner.assembly import ActuatorUse, arms_shift
 from aerial_planner.checks import VIOLATION_TOLERANCE, attitude_miss
@@ -23,7 +24,8 @@ from aerial_planner.trajectory import TakeOffTrajectory
 from aerial_planner.transcription import Solution
 
 _EXACT_SHARE = 0.95  # of the limits is what exact torques may take; the rest is the controller's
-_ROUNDS, _LAST_SHARE = 3, 1.03  # after so many attempts this share is good enough
+_ROUNDS, _LAST_SHARE = 3, 1.03  # after so many rounds this share is good enough
+_IMPROVEMENTS = 12  # that are tried at the most
 _TIGHTENING = 0.98  # by which limits are lowered further than exact torques were beyond that, and folding slowed down
 _WORTH_CORRECTING = np.deg2rad(1.5)  # by which a finely integrated flight may miss its attitude [rad]
 _WORTH_MOVING = 0.015  # by which feet may be off where they should land, over the height of the centre of mass
@@ -31,36 +33,20 @@ _CORRECTABLE = np.deg2rad(30.0)  # beyond this it is another motion [rad]
 _CUT_SHORT = 1.01  # times the shortest flight
 
 
-class Outcome(NamedTuple):
-    """What came of an attempt."""
-
-    schedule: Schedule
-    reference: Reference
-    take_off: TakeOffTrajectory
-    solution: Solution
-    plan: Plan
-    use: ActuatorUse
-
-    @property
-    def cut_short(self) -> bool:
-        """Whether it is an optimum with a flight as short as may be: poor local ones are like that."""
-        if self.solution.max_violation > VIOLATION_TOLERANCE:
-            return False
-        return self.take_off.flight_time < _CUT_SHORT * self.schedule.flight_time_range[0]
-
-
-@dataclass
+@dataclass(frozen=True, kw_only=True)
 class Attempt:
-    """What is asked of the optimizer; it changes from one attempt at a request to the next."""
+    """What is asked of the optimizer; see ``Schedule`` for what is not said here."""
 
+    request: MotionRequest
     margin: Margin
-    rounds: int = 0  # of judging exact torques
     least_rise: float = 0.0  # of the flight [m]
-    folding_time: float = 0.0  # see ``Schedule`` [s]
-    arms_shift: np.ndarray = field(default_factory=lambda: np.zeros(3))  # see ``Schedule``
-    landing_speed: float | None = None  # see ``Schedule``
-    correction: np.ndarray = field(default_factory=lambda: np.zeros(3))  # see ``Schedule``
-    take_off: TakeOffTrajectory | None = None  # that the attempt before came to
+    folding_time: float = 0.0  # [s]
+    arms_shift: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    landing_speed: float | None = None
+    correction: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    take_off: TakeOffTrajectory | None = None  # where to start: what the attempt before came to
+    rounds: int = 0  # in which exact torques were too near to the limits
+    number: int = 0  # of improvements
 
     def schedule(self, usual: Schedule) -> Schedule:
         """Return the schedule of the request with what is asked for."""
@@ -72,61 +58,87 @@ class Attempt:
             folding_time=self.folding_time,
         )
 
-    def improve(
-        self, outcome: Outcome, robot: Robot, settings: PlannerSettings, variant: Variant, *, again: bool
-    ) -> bool:
-        """Ask for what would make a plan better; return whether anything would.
+    def improved(self, outcome: Outcome, robot: Robot, settings: PlannerSettings, variant: Variant) -> Attempt | None:
+        """Return an attempt at a better plan; None if nothing is worth it, or enough has been tried.
 
         Args:
             outcome: of this attempt.
             robot: the whole robot.
             settings: of the planner.
             variant: whose limits count.
-            again: it started from a plan: then the legs' inertia was that of nearly the same poses.
         """
-        aimed = self._aim(outcome, robot)
-        return (variant is not Variant.KD and self._ease(outcome, robot, settings, again=again)) or aimed
+        if self.number == _IMPROVEMENTS:
+            return None
+        changes = self._aimed(outcome, robot)
+        if variant is not Variant.KD:
+            changes |= self._eased(outcome, robot, settings)
+        return replace(self, number=self.number + 1, **changes) if changes else None
 
-    def _aim(self, outcome: Outcome, robot: Robot) -> bool:
-        """Correct the attitude at touchdown, and where the feet are to be then."""
-        plan, reference, improved = outcome.plan, outcome.reference, False
+    def _aimed(self, outcome: Outcome, robot: Robot) -> dict[str, Any]:
+        """Return what corrects the attitude at touchdown, and where the feet are to be then."""
+        plan, reference = outcome.plan, outcome.reference
+        changes: dict[str, Any] = {}
         miss = attitude_miss(plan, outcome.schedule)
         if _WORTH_CORRECTING < np.linalg.norm(miss) < _CORRECTABLE:
-            self.correction = self.correction - miss
-            improved = True
+            changes["correction"] = self.correction - miss
         little = _WORTH_MOVING * plan.landing_com_height
-        shift = arms_shift(plan, robot)
+        shift = arms_shift(plan, robot, robot.with_held(reference.landing_joint_position))
         if np.linalg.norm(shift - self.arms_shift) > little:
-            self.arms_shift = shift
-            improved = True
+            changes["arms_shift"] = shift
         speed = float(np.linalg.norm(plan.com_velocity[-1, :2]))
         if reference.landing_lead_time * abs(speed - reference.landing_speed) > little:
-            self.landing_speed = speed
-            improved = True
-        return improved
+            changes["landing_speed"] = speed
+        return changes
 
-    def _ease(self, outcome: Outcome, robot: Robot, settings: PlannerSettings, *, again: bool) -> bool:
-        """Lower the limits of joints whose exact torques are too near to them, and have the legs fold more slowly."""
+    def _eased(self, outcome: Outcome, robot: Robot, settings: PlannerSettings) -> dict[str, Any]:
+        """Return what keeps exact torques off the limits: lower ones for joints that come too near, slower folding.
+
+        The first time, the legs' inertia was that of other poses: another start may be all it takes.
+        """
         use, schedule, path = outcome.use, outcome.schedule, outcome.reference.flight_path
-        self.rounds += 1
-        share = _EXACT_SHARE if self.rounds <= _ROUNDS else _LAST_SHARE
-        over = use.in_take_off / share
-        improved = bool(np.any(over > 1.0))
-        if improved and again:
-            self.margin = replace(self.margin, take_off=_tightened(self.margin.take_off, over))
+        share = _EXACT_SHARE if self.rounds < _ROUNDS else _LAST_SHARE
+        changes: dict[str, Any] = {}
+        margin, over = self.margin, use.in_take_off / share
+        if np.any(over > 1.0):
+            if outcome.from_a_plan:
+                margin = replace(margin, take_off=_tightened(margin.take_off, over))
+            changes["margin"] = margin
         haste = np.sqrt(use.in_flight.max() / share)
         longest = path.ready / schedule.flight_knots * schedule.flight_time
-        if haste > 1.0 and self.folding_time < longest:
-            folding = max(path.settling_time, path.turning / schedule.flight_knots * schedule.flight_time)
-            self.folding_time = min(folding * haste / _TIGHTENING, longest)
-            return True
         over = use.at_lift_off / share
         over[robot.arms] = use.in_flight[robot.arms] / share
-        if np.any(over > 1.0):  # the legs cannot take longer: they must leave the ground slower
-            least = np.minimum(self.margin.flight, settings.margin)
-            self.margin = replace(self.margin, flight=_tightened(least, over))
-            improved = True
-        return improved
+        if haste > 1.0 and self.folding_time < longest:
+            folding = max(path.settling_time, path.turning / schedule.flight_knots * schedule.flight_time)
+            changes["folding_time"] = min(folding * haste / _TIGHTENING, longest)
+        elif np.any(over > 1.0):  # the legs cannot take longer: they must leave the ground slower
+            least = np.minimum(margin.flight, settings.margin)
+            changes["margin"] = replace(margin, flight=_tightened(least, over))
+        return changes | {"rounds": self.rounds + 1} if changes else {}
+
+
+class Outcome(NamedTuple):
+    """What came of an attempt."""
+
+    attempt: Attempt  # with the take-off it came to
+    from_a_plan: bool  # whether it started from one of the same request
+    schedule: Schedule
+    reference: Reference
+    solution: Solution
+    plan: Plan
+    use: ActuatorUse
+
+    @property
+    def is_feasible(self) -> bool:
+        """Whether the optimizer's constraints hold."""
+        return self.solution.max_violation <= VIOLATION_TOLERANCE
+
+    @property
+    def is_poor(self) -> bool:
+        """Whether it is an optimum with a flight as short as may be, which another start might better."""
+        attempt = self.attempt
+        if not self.is_feasible or not attempt.request.warm_start or attempt.least_rise > 0.0:
+            return False
+        return attempt.take_off.flight_time < _CUT_SHORT * self.schedule.flight_time_range[0]
 
 
 def _tightened(margin: np.ndarray, over: np.ndarray) -> np.ndarray:

@@ -46,7 +46,7 @@ class KinoDynamic(KinoDynamicKinds):
     def violation(
         self, schedule: Schedule, reference: Reference, trajectory: TakeOffTrajectory, guess: TakeOffTrajectory
     ) -> float:
-        """Return by how much ``trajectory`` misses any constraint of the problem that starts at ``guess``, SI units."""
+        """Return by how much ``trajectory`` misses any constraint, SI units, torque limits of the take-off as at ``guess``."""
         inertia = leg_inertia_along(self._whole, guess)
         stages = self._stages(schedule, reference, trajectory, self._usual_margin, inertia)
         return self.problem(schedule).violation(stages)
@@ -167,10 +167,10 @@ class KinoDynamic(KinoDynamicKinds):
         return steps * len(steps) / guess.flight_time
 
     def _upper_limits(self, path: FlightPath, guess: TakeOffTrajectory, margin: Margin) -> np.ndarray:
-        """Return the parameters of ``_upper_rows`` of each flight knot ``(M, n)``, the first one's unused."""
+        """Return the parameters of ``_upper_rows`` at each flight knot after the lift-off's, one row each."""
         M, joints, arms = len(path.fraction), self._upper, self.robot.arms
         if self.variant is Variant.KD or len(arms) == 0:
-            return np.zeros((M, 0))
+            return np.zeros((M - 1, 0))
         legs = np.setdiff1d(np.arange(self.robot.n_joints), arms)
         dt = guess.flight_time / M
         middle = (np.arange(M) + 0.5) * dt
@@ -178,10 +178,9 @@ class KinoDynamic(KinoDynamicKinds):
         _, rate = path.at(start, middle, T)
         _, both = path.from_take_off(start, guess.joint_velocity[-1], middle, T)
         limits = []
-        for k in range(M):
+        for k in range(1, M):
             inertia = LegInertia.at(self._whole, guess.flight_joint_position[k]).joint[joints]
-            before = max(k - 1, 0)
-            folding, total = (rate[k] - rate[before]) / dt, (both[k] - both[before]) / dt
+            folding, total = (rate[k] - rate[k - 1]) / dt, (both[k] - both[k - 1]) / dt
             torques = inertia[:, legs] @ (total - folding)[legs], inertia[:, legs] @ folding[legs] * T**2
             limits.append(np.concatenate([inertia[:, arms].ravel(order="F"), *torques, margin.flight[joints]]))
         return np.array(limits)
@@ -202,7 +201,7 @@ class KinoDynamic(KinoDynamicKinds):
         for k in range(1, M + 1):
             x_k = np.concatenate([guess.angular_momentum[-1], flight[k], T, arm_rate[k - 1]])
             if k < M:
-                p = np.concatenate([path.parameters(k), reference.flight_orientation[k], limits[k]])
+                p = np.concatenate([path.parameters(k), reference.flight_orientation[k], limits[k - 1]])
                 u = np.concatenate([guess.flight_angular_velocity[k], arm_rate[k]])
                 u_min = np.concatenate([np.full(3, -np.inf), -speed[arms]])
                 stages.append(StageData.free(p=p, x=x_k, u=u, u_min=u_min, u_max=-u_min, **bounds))

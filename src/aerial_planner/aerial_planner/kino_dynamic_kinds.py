@@ -68,7 +68,7 @@ class KinoDynamicKinds(Formulation):
         self._whole = robot
         self.variant = variant
         self.timed = timed
-        # Joints that the flight moves, or that must hold on while others move: their torques are limited all the way.
+        # Of the whole robot, the joints that carry no contact: arms, which the flight moves, and held ones, which bear it.
         self._upper = np.union1d(robot.planned_joints[self.robot.arms], np.flatnonzero(robot.held_joints))
 
     def kinds(self, schedule: Schedule) -> list[StageKind]:
@@ -241,7 +241,7 @@ class KinoDynamicKinds(Formulation):
             robot = self.robot
             name = "flight" if len(robot.arms) == 0 else f"flight_{self.variant.name}"
             alpha, quaternion, q_j = ca.SX.sym("alpha", 3), ca.SX.sym("quat", 4), ca.SX.sym("q_j", robot.n_joints)
-            T, omega, p = ca.SX.sym("T"), ca.SX.sym("omega", 3), ca.SX.sym("p", FlightKnot.n_p(robot))
+            T, omega, p = ca.SX.sym("T"), ca.SX.sym("omega", 3), ca.SX.sym("p", FlightKnot.n_parameters(robot))
             arm_rate, before = ca.SX.sym("arm_rate", len(robot.arms)), ca.SX.sym("before", len(robot.arms))
             quaternion_ref, w = ca.SX.sym("quat_ref", 4), self.settings.weights
             flight = FlightKnot(

@@ -72,7 +72,7 @@ class TakeOffKnot:
     Args:
         robot: the robot, as plans see it.
         model: its expressions.
-        n_whole: number of its joints, held ones included; None: as many as are planned.
+        n_whole: number of its joints, held ones included.
         loaded: which contacts push.
         in_flight: the lift-off knot.
         last: the one before it, whose control has the rates at which the contacts end of the joints that hold them.
@@ -86,14 +86,13 @@ class TakeOffKnot:
         model: BaseFrameModel,
         loaded: Sequence[bool],
         *,
-        n_whole: int | None = None,
+        n_whole: int,
         in_flight: bool = False,
         last: bool = False,
         timed: bool = False,
         ends_phase: bool = False,
     ) -> None:
         n, n_c = robot.n_joints, robot.n_contacts
-        n_whole = n if n_whole is None else n_whole
         self._model = model
         self.r, self.rdot, self.alpha = (ca.SX.sym(name, 3) for name in ("r", "rdot", "alpha"))
         self.quaternion, self.q_j = ca.SX.sym("quat", 4), ca.SX.sym("q_j", n)
@@ -123,7 +122,7 @@ class TakeOffKnot:
             self.arm_rate = ca.SX.sym("arm_rate", len(robot.arms))
             self.u = ca.vertcat(self.omega, self.omega_ground, self.arm_rate, self.flight_time)
             self.landing_com = ca.SX.sym("landing_com", 3)
-            self.flight_p = ca.SX.sym("flight_p", FlightKnot.n_p(robot))
+            self.flight_p = ca.SX.sym("flight_p", FlightKnot.n_parameters(robot))
             self.margin = ca.SX.sym(
                 "margin", n_whole
             )  # share of the torque limits that the legs' flight may begin with
@@ -228,7 +227,7 @@ class FlightKnot:
         self.arm_acceleration = (arm_rate - arm_rate_before) / ((0.5 if first else 1.0) * self.dt)
 
     @staticmethod
-    def n_p(robot: Robot) -> int:
+    def n_parameters(robot: Robot) -> int:
         """Number of parameters: share of the flight time, fraction of the way to the target pose, the target pose."""
         return 2 + robot.n_joints
 

@@ -36,7 +36,7 @@ class _Entry:
 
     plan: Plan
     n_knots: int  # N of its take-off
-    place: np.ndarray  # (6 + n,), see ``_place``
+    place: np.ndarray  # (6 + n_p,), see ``_place``
 
     @property
     def contacts(self) -> bytes:
@@ -134,7 +134,7 @@ def _files(folder: Path) -> list[Path]:
 
 
 def _place(landing: np.ndarray, turn: np.ndarray, start: np.ndarray, height: float) -> np.ndarray:
-    """Return goal and start as a point ``(6 + n,)`` in a space where 1 is far: standing heights and radians."""
+    """Return goal and start as a point ``(6 + n_p,)`` in a space where 1 is far: standing heights and radians."""
     return np.concatenate([landing / height, turn, start])
 
 

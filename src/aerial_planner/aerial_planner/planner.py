@@ -208,68 +208,85 @@ class Planner:
         stage = self._stage(request)
         motion = load_motion(request.motion, self.robot)
         q_start = self._start_configuration(start)
-        attempt = Attempt(margin=Margin.usual(self.robot, self.settings))
+        first = Attempt(request=request, margin=Margin.usual(self.robot, self.settings))
+        attempt, most = first, _ITERATIONS_OF_REQUEST
         good: Outcome | None = None  # the last that may be handed out, should a better one not be found
-        start_as = request
         while True:
-            outcome, again = self._outcome(start_as, stage, motion, q_start, attempt, progress, clock)
-            refusal = self._refusal(outcome)
-            if refusal is not None and outcome.cut_short and start_as.warm_start:
-                start_as = replace(request, warm_start=False)
-                attempt = Attempt(margin=Margin.usual(self.robot, self.settings))
-                continue
-            may_go_on = (
-                outcome.solution.max_violation <= VIOLATION_TOLERANCE and clock.iterations <= _ITERATIONS_OF_REQUEST
-            )
-            if may_go_on and attempt.improve(outcome, self.robot, self.settings, stage.variant, again=again):
-                good = outcome if refusal is None else good
-                continue
-            if refusal is not None and good is not None:
-                outcome, good = good, None
-                attempt.take_off = outcome.take_off
-            elif refusal is not None:
-                raise refusal
+            outcome = None
+            try:
+                outcome = self._outcome(attempt, stage, motion, q_start, progress, clock)
+                better = None
+                if outcome.is_feasible and clock.iterations <= most:
+                    better = outcome.attempt.improved(outcome, self.robot, self.settings, stage.variant)
+                if better is not None:
+                    good = outcome if self._refusal(outcome) is None else good
+                    attempt = better
+                    continue
+                refusal = self._refusal(outcome)
+                if refusal is not None:
+                    raise refusal
+                missing, reason = self._missing_height(outcome.plan)
+            except RefusalError:
+                if good is not None:
+                    outcome, good = good, None
+                    missing, reason = self._missing_height(outcome.plan)
+                elif outcome is not None and outcome.is_poor:
+                    attempt = replace(first, request=replace(request, warm_start=False))
+                    most = clock.iterations + _ITERATIONS_OF_REQUEST
+                    continue
+                else:
+                    raise
             plan, solution, use = outcome.plan, outcome.solution, outcome.use
-            missing, reason = self._missing_height(plan)
             if missing == 0.0:
                 progress("checked", clock.iterations, solution.max_violation)
                 if self.plans is not None:
                     self.plans.add(plan)
                 report = self._report(request, clock, plan=plan, solution=solution, use=use)
                 return PlanningResult(plan=plan, report=report, actuator_use=use)
-            if clock.iterations > _ITERATIONS_OF_REQUEST:
+            if clock.iterations > most:
                 what = "platform edge" if request.terrain.boxes else "foot clearance"
                 raise RefusalError(RefusalCode.CHECK_FAILED, f"{what}: {reason}, also on a higher flight")
-            attempt.least_rise = float(plan.com[:, 2].max()) - plan.landing_com_height + missing + _CLEARANCE_SPARE
+            rise = float(plan.com[:, 2].max()) - plan.landing_com_height + missing + _CLEARANCE_SPARE
+            attempt = replace(outcome.attempt, least_rise=rise, rounds=0)
             good = None  # it does not clear the terrain
 
     def _outcome(
         self,
-        request: MotionRequest,
+        attempt: Attempt,
         stage: KinoDynamic,
         motion: Motion,
         q_start: np.ndarray,
-        attempt: Attempt,
         progress: Progress,
         clock: _Clock,
-    ) -> tuple[Outcome, bool]:
-        """Return what comes of an attempt, and whether it started from a plan."""
+    ) -> Outcome:
+        """Return what comes of an attempt.
+
+        Raises:
+            RefusalError: if its goal or terrain cannot be, or not even a single rigid body gets there.
+        """
+        request = attempt.request
         schedule = attempt.schedule(self._schedule(request, motion, attempt.least_rise))
         reference = body_reference(schedule, q_start, self._body, self._model, self._ik, self.settings)
         screen(request, schedule, reference, self._body)
-        again = attempt.take_off is not None
-        if again:  # the plan that was not good enough is near
+        if attempt.take_off is None:
+            take_off, solution = self._take_off(request, stage, schedule, reference, progress, clock)
+        else:  # the plan that was not good enough is near
             take_off, solution = self._optimize(
                 stage, schedule, reference, attempt.take_off, progress, clock, margin=attempt.margin
             )
-        else:
-            take_off, solution = self._take_off(request, stage, schedule, reference, progress, clock)
-        attempt.take_off = take_off
         plan = with_held_joints(assemble(request, self._body, self._model, schedule, reference, take_off), self.robot)
-        return Outcome(schedule, reference, take_off, solution, plan, actuator_use(plan, self.robot)), again
+        return Outcome(
+            attempt=replace(attempt, take_off=take_off),
+            from_a_plan=attempt.take_off is not None,
+            schedule=schedule,
+            reference=reference,
+            solution=solution,
+            plan=plan,
+            use=actuator_use(plan, self.robot),
+        )
 
     def _refusal(self, outcome: Outcome) -> RefusalError | None:
-        """Return why a plan must not be handed out."""
+        """Return why a plan must not be handed out, whatever the terrain."""
         try:
             check(outcome.plan, outcome.schedule, outcome.solution, outcome.use, self.robot, self.actuator_tolerance)
         except RefusalError as refusal:

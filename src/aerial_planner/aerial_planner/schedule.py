@@ -105,7 +105,7 @@ class Schedule:
     )  # (3,) of what to aim at, in the landed base [rad]
     arms_shift: np.ndarray = field(
         default_factory=lambda: np.zeros(3)
-    )  # (3,) of the centre of mass at touchdown by arms that are not at home, in S [m]
+    )  # (3,) of the centre of mass at touchdown by arms that are not in the landing pose, in S [m]
     landing_speed: float | None = None  # over ground that the landing is to stop; None: as guessed from the way [m/s]
     folding_time: float = 0.0  # that the legs take at least to end the take-off's motion and fold [s]
 

@@ -60,4 +60,4 @@ def _landing_feet(schedule: Schedule, reference: Reference, robot: Robot) -> np.
     """Return where the contact points ``(n_c, 3)`` [m] meet the ground if all goes as in the reference, in S."""
     q = np.concatenate([np.zeros(3), schedule.landing_orientation, reference.landing_joint_position])
     com = pin.centerOfMass(robot.model, robot.model.createData(), q)
-    return robot.contact_positions(q) + reference.landing_com - com
+    return robot.contact_positions(q) + reference.landing_com - schedule.arms_shift - com

@@ -117,10 +117,15 @@ class Drive:
 
 
 def _lightness(robot: Robot, damping: float) -> np.ndarray:
-    """Return by what share ``(n,)`` of the gains each joint is led: less where it moves too little for all of it."""
+    """Return by what share ``(n,)`` of the gains each joint is led: less where it moves too little for all of it.
+
+    It is that of the damping while the robot moves; a stop's, which is several times as strong, is lowered alike.
+    """
+    if damping == 0.0:
+        return np.ones(robot.n_joints)
     state = Kinematics(robot).at(robot.standing_configuration(), np.zeros(robot.model.nv))
     inertia = 1.0 / np.diag(state.M_inv)[JOINT_VELOCITY]  # with all others free [kg·m²]
-    return np.minimum(1.0, _FASTEST * inertia / max(damping, np.finfo(float).tiny))
+    return np.minimum(1.0, _FASTEST * inertia / damping)
 
 
 @compiled

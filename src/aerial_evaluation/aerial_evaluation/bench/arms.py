@@ -1,4 +1,4 @@
-"""What arms do that nobody commands: how far they move and how much of the angular momentum they carry, phase by phase."""
+"""What arms do that no goal asks for: how far they move and how much of the angular momentum they carry, phase by phase."""
 
 from __future__ import annotations
 
@@ -70,8 +70,12 @@ def _course(outcome: Outcome, robot: Robot) -> _Course:
     plan, kinematics = outcome.planning.plan, Kinematics(robot)
     moving = robot.planned_joints[robot.planned.arms]
     legs = np.setdiff1d(np.arange(robot.n_joints), robot.arms)
-    columns = {"base": np.arange(BASE_TWIST.stop), "legs": JOINT_VELOCITY.start + legs}
-    columns["arms"] = JOINT_VELOCITY.start + robot.arms
+    rest = np.setdiff1d(robot.arms, moving)  # held joints go with the base
+    columns = {
+        "base": np.concatenate([np.arange(BASE_TWIST.stop), JOINT_VELOCITY.start + rest]),
+        "legs": JOINT_VELOCITY.start + legs,
+        "arms": JOINT_VELOCITY.start + moving,
+    }
     begin, end = outcome.start_time, outcome.start_time + plan.landing_time + LANDING
     truths = [tick.truth for tick in outcome.ticks if begin <= tick.truth.time < end]
     time = np.array([truth.time for truth in truths]) - begin
