@@ -99,20 +99,11 @@ def assemble(
     fall = np.array([0.0, 0.0, GRAVITY])
     com = take_off.com[-1] + take_off.com_velocity[-1] * t - 0.5 * fall * t**2
     com_velocity = take_off.com_velocity[-1] - fall * t
-    flight_q = _configurations(model, com, flight.orientation, flight.joint_position)
     alpha = take_off.angular_momentum[-1]
-    flight_v = np.array(
-        [
-            _flying_velocity(
-                robot,
-                data,
-                flight_q[k],
-                flight.joint_velocity[k],
-                np.concatenate([robot.mass * com_velocity[k], alpha]),
-            )
-            for k in range(len(flight_q))
-        ]
-    )
+    flight_q = _configurations(model, com, flight.orientation, flight.joint_position)
+    flight_momentum = np.hstack([robot.mass * com_velocity, np.tile(alpha, (len(flight_q), 1))])
+    in_flight = zip(flight_q, flight.joint_velocity, flight_momentum, strict=True)
+    flight_v = np.array([_flying_velocity(robot, data, *sample) for sample in in_flight])
     q = np.vstack([q, flight_q[1:]])
     v = np.vstack([v, flight_v[1:]])
     K, n_c = len(q), robot.n_contacts

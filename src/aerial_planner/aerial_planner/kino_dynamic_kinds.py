@@ -24,6 +24,8 @@ there are any, go where the angular momentum asks them to.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import casadi as ca
 import numpy as np
 
@@ -279,10 +281,7 @@ class KinoDynamicKinds(Formulation):
         arms = self.robot.arms.tolist()
         if arms:
             acceleration[arms] = flight.arm_acceleration
-        torque = ca.mtimes(s.flight_inertia, acceleration)
-        for joint, name in enumerate(self._whole.joint_names):
-            limit = float(self._whole.actuators.torque_max[joint])
-            rows.between(f"{name} torque", torque[joint] / limit / s.margin[joint], -1.0, 1.0)
+        self._torque_rows(rows, range(self._whole.n_joints), ca.mtimes(s.flight_inertia, acceleration), s.margin)
 
     def _upper_rows(self, rows: Rows, flight: FlightKnot) -> ca.SX:
         """Add torque limits of the joints that carry no contact, in flight, if arms move; return their parameters.
@@ -296,10 +295,14 @@ class KinoDynamicKinds(Formulation):
         inertia, margin = ca.SX.sym("H_arms", len(joints), n_a), ca.SX.sym("margin", len(joints))
         settling, folding = ca.SX.sym("tau_settling", len(joints)), ca.SX.sym("tau_folding", len(joints))
         torque = settling + folding / flight.flight_time**2 + ca.mtimes(inertia, flight.arm_acceleration)
+        self._torque_rows(rows, joints, torque, margin)
+        return ca.vertcat(ca.vec(inertia), settling, folding, margin)
+
+    def _torque_rows(self, rows: Rows, joints: Iterable[int], torque: ca.SX, margin: ca.SX) -> None:
+        """Add that the torques of some of the whole robot's joints keep to a share of their limits."""
         for row, joint in enumerate(joints):
             limit = float(self._whole.actuators.torque_max[joint]) * margin[row]
             rows.between(f"{self._whole.joint_names[joint]} torque", torque[row] / limit, -1.0, 1.0)
-        return ca.vertcat(ca.vec(inertia), settling, folding, margin)
 
     def _arm_cost(self, flight: FlightKnot) -> ca.SX:
         """Return the cost of how arms move: without one they would jump, in flight as on the ground."""
