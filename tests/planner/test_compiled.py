@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from aerial_planner.compiled import CompilationError, FunctionLibrary
-from aerial_planner.nlp import FlatProgram
+from aerial_planner.interior_point import InteriorPoint
 from aerial_planner.planner import Planner
-from aerial_planner.solver import SolverName, SolverOptions
+from aerial_planner.solver import SolverOptions
 from aerial_planner.stage import Rows, StageKind
 
 from .conftest import jump
@@ -31,16 +31,52 @@ def library(tmp_path):
     return FunctionLibrary(tmp_path)
 
 
-def test_compiled_functions_give_the_interpreted_numbers(library, kind):
+def evaluated(function, n, arguments, sizes):
+    """Return the results of a function at n points."""
+    results = [np.full(n * size, np.nan) for size in sizes]
+    function.bind(n, arguments, results)()
+    return results
+
+
+@pytest.mark.parametrize("n", [1, 4, 6])  # points: some lanes left over, none, both
+def test_compiled_functions_give_the_interpreted_numbers_to_the_last_bit(library, kind, n):
     assert library.load(kind) is None
     assert library.compile(kind)
-    compiled, interpreted = library.load(kind), kind.functions()
     rng = np.random.default_rng(0)
-    for name in ("values", "gradient", "jacobian", "hessian"):
-        ours, theirs = getattr(compiled, name), getattr(interpreted, name)
-        arguments = [rng.normal(size=theirs.size_in(i)) for i in range(theirs.n_in())]
-        for a, b in zip(ours.call(arguments), theirs.call(arguments), strict=True):
-            np.testing.assert_allclose(ca.DM(a).full(), ca.DM(b).full(), atol=1e-14)
+    for ours, theirs, function in zip(library.load(kind), kind.interpreted(), kind.together(), strict=True):
+        arguments = [rng.normal(size=n * function.nnz_in(i)) for i in range(function.n_in())]
+        sizes = [function.nnz_out(i) for i in range(function.n_out())]
+        for i, (a, b) in enumerate(
+            zip(evaluated(ours, n, arguments, sizes), evaluated(theirs, n, arguments, sizes), strict=True)
+        ):
+            np.testing.assert_array_equal(a, b)
+            np.testing.assert_array_equal(ours.nonzeros(i), theirs.nonzeros(i))
+
+
+def test_rows_of_another_size_are_refused(library, kind):
+    library.compile(kind)
+    for evaluation in (library.load(kind), kind.interpreted()):
+        with pytest.raises(ValueError, match="expected rows of"):
+            evaluation.values.bind(2, [np.zeros(6), np.zeros(2)], [np.zeros(2), np.zeros(4), np.zeros(3)])
+
+
+def test_every_operation_there_is_c_for_is_computed_as_casadi_does(library):
+    x = ca.SX.sym("x", 2)
+    a, b = ca.vertsplit(x)
+    unary = [ca.sqrt, ca.sin, ca.cos, ca.tan, ca.asin, ca.acos, ca.atan, ca.tanh, ca.exp, ca.log, ca.fabs, lambda v: -v]
+    binary = [a + b, a - b, a * b, a / b, a**b, ca.atan2(a, b), ca.fmin(a, b), ca.fmax(a, b), a**2, 2 * a, 1 / a, a**1.7]
+    f = ca.Function("operations", [x], [ca.vertcat(*(u(a) for u in unary), *binary, np.inf, a)])
+    assert library.compile_function(f)
+    points = np.random.default_rng(1).uniform(0.1, 0.9, size=5 * 2)
+    (ours,) = evaluated(library.load_function(f), 5, [points], [f.nnz_out(0)])
+    theirs = np.hstack([f(point).full().ravel() for point in points.reshape(5, 2)])
+    np.testing.assert_allclose(ours, theirs, rtol=1e-15)
+
+
+def test_an_operation_there_is_no_c_for_is_named(library):
+    x = ca.SX.sym("x")
+    with pytest.raises(CompilationError, match="no C for CasADi's operation"):
+        library.compile_function(ca.Function("floored", [x], [ca.floor(x)]))
 
 
 def test_what_is_compiled_is_not_compiled_again(library, kind):
@@ -59,21 +95,20 @@ def test_bounds_are_no_part_of_what_is_compiled(library, kind):
     assert library.load(dataclasses.replace(kind, upper=kind.upper + 1)) is not None
 
 
-def test_a_problem_solves_with_compiled_functions_and_without(library, kind):
+def test_a_problem_solves_alike_with_compiled_functions_and_without(library, kind):
     x = ca.SX.sym("x", 2)
     end = Rows()
     end.equal("goal", x - ca.DM([0.2, 0.1]))
-    kinds = [kind, end.stage("end", x, ca.SX(0, 1), ca.SX(0, 1), ca.SX(0), None)]
+    kinds = [kind] * 6 + [end.stage("end", x, ca.SX(0, 1), ca.SX(0, 1), ca.SX(0), None)]
     for k in kinds:
         library.compile(k)
-    options = SolverOptions(solver=SolverName.FATROP)
-    programs = [
-        FlatProgram(kinds, functions_of, options).functions for functions_of in (StageKind.functions, library.load)
+    free = np.full(6 * 3 + 2, np.inf)
+    outcomes = [
+        InteriorPoint(kinds, evaluation_of, SolverOptions()).solve(np.zeros(len(free)), np.ones(6), -free, free)
+        for evaluation_of in (StageKind.interpreted, library.load)
     ]
-    point = np.random.default_rng(1).normal(size=programs[0]["nlp_g"].size1_in(0))
-    for name in ("nlp_f", "nlp_g", "nlp_jac_g"):
-        a, b = (functions[name].call([point, np.ones(1)])[-1] for functions in programs)
-        np.testing.assert_allclose(ca.DM(a).full(), ca.DM(b).full(), atol=1e-14)
+    assert outcomes[0].converged
+    np.testing.assert_array_equal(outcomes[0].w, outcomes[1].w)
 
 
 def test_without_a_compiler_there_is_a_sentence(library, kind, monkeypatch):

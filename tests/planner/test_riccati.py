@@ -9,7 +9,11 @@ from aerial_planner.riccati import LinearQuadratic
 def problem(seed, *, nx=(4, 5, 3, 4), nu=(3, 2, 3, 0), nc=(4, 3, 1, 2)):
     """Return a convex problem with random numbers."""
     rng = np.random.default_rng(seed)
-    lq = LinearQuadratic(np.array(nx), np.array(nu), np.array(nc))
+    steps = [rng.normal(size=(n, x + u)) for n, x, u in zip((*nx[1:], 0), nx, nu, strict=True)]
+    for F in steps:
+        F[rng.random(F.shape) < 0.3] = 0.0
+    links = [np.argwhere(F) for F in steps]
+    lq = LinearQuadratic(np.array(nx), np.array(nu), np.array(nc), links)
     for k, (x, u, c) in enumerate(zip(nx, nu, nc, strict=True)):
         y = x + u
         root = rng.normal(size=(y, y))
@@ -17,8 +21,15 @@ def problem(seed, *, nx=(4, 5, 3, 4), nu=(3, 2, 3, 0), nc=(4, 3, 1, 2)):
         lq.C[k, :c, :y], lq.c[k, :c] = rng.normal(size=(c, y)), rng.normal(size=c)
         if k < len(nx) - 1:
             following = nx[k + 1]
-            lq.F[k, :following, :y], lq.f[k, :following] = rng.normal(size=(following, y)), rng.normal(size=following)
+            lq.F[k, : len(links[k])], lq.f[k, :following] = steps[k][tuple(links[k].T)], rng.normal(size=following)
     return lq
+
+
+def step(lq, k):
+    """Return F of a stage."""
+    F, links = np.zeros((lq.nx[k + 1], lq.nx[k] + lq.nu[k])), lq.links[k, : lq.n_links[k]]
+    F[tuple(links.T)] = lq.F[k, : len(links)]
+    return F
 
 
 def residuals(lq):
@@ -34,8 +45,8 @@ def residuals(lq):
             gradient[u:] += lq.dynamics[k - 1, : lq.nx[k]]
         if k < len(y) - 1:
             x = lq.nx[k + 1]
-            gradient -= lq.F[k, :x, :n].T @ lq.dynamics[k, :x]
-            misses.append(y[k + 1][lq.nu[k + 1] :] - lq.F[k, :x, :n] @ y_k - lq.f[k, :x])
+            gradient -= step(lq, k).T @ lq.dynamics[k, :x]
+            misses.append(y[k + 1][lq.nu[k + 1] :] - step(lq, k) @ y_k - lq.f[k, :x])
         gradients.append(gradient)
     return np.concatenate(gradients), np.concatenate(misses)
 

@@ -83,7 +83,7 @@ def test_stage_wise_derivatives_are_those_of_the_whole_problem():
     end.between("b", y[0] * y[1] * y[2], -1.0, 1.0)
     one = first.stage("one", x, u, p, ca.exp(x[1]) * u**2, ca.vertcat(x[0] * u, ca.cos(x[1]), p * u))
     two = end.stage("two", y, ca.SX(0, 1), ca.SX(0, 1), ca.sumsqr(y) ** 2, None)
-    functions = FlatProgram([one, two], StageKind.functions, SolverOptions(solver=SolverName.FATROP)).functions
+    functions = FlatProgram([one, two], SolverOptions(solver=SolverName.FATROP)).functions
 
     w, lam_g, lam_f = ca.MX.sym("w", 6), ca.MX.sym("l", 5), ca.MX.sym("lf")
     f, g = functions["nlp_f"](w, 0.7), functions["nlp_g"](w, 0.7)

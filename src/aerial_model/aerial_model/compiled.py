@@ -12,6 +12,7 @@ from numba import njit
 from aerial_model import actuator, rotation
 
 compiled = njit(cache=True, error_model="numpy")
+reordered = njit(cache=True, error_model="numpy", fastmath={"contract", "nnan", "nsz", "reassoc"})  # sums in any order: several at once
 
 product_of = compiled(rotation.product_of)
 exp_of = compiled(rotation.exp_of)

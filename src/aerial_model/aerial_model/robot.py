@@ -138,6 +138,18 @@ class Robot:
         pin.framesForwardKinematics(self.model, data, q)
         return np.array([data.oMf[frame].translation for frame in self.contact_frames])
 
+    def mass_matrices(self, q_j: np.ndarray) -> np.ndarray:
+        """Return mass matrices H ``(K, nv, nv)``, rotor inertia included, with the joints at ``q_j`` ``(K, n)`` [rad]."""
+        data = self.model.createData()
+        upper = np.zeros((len(q_j), self.model.nv, self.model.nv))
+        q = np.concatenate([np.zeros(3), IDENTITY, np.zeros(self.n_joints)])  # it does not depend on the base
+        for k, positions in enumerate(q_j):
+            q[JOINT_POSITION] = positions
+            upper[k] = np.triu(pin.crba(self.model, data, q))
+        below = np.tril_indices(self.model.nv, -1)
+        upper[:, below[0], below[1]] = upper[:, below[1], below[0]]
+        return upper
+
     @property
     def contact_links(self) -> np.ndarray:
         """Which joint's link each contact point belongs to ``(n_c,)`` int."""

@@ -20,6 +20,7 @@ from aerial_planner.trajectory import TakeOffTrajectory
 
 _FLIGHT_STEP = 0.01  # of the flight's integration and of the plan's samples there [s]
 _SAME_TIME = 1e-9  # [s]
+_DAMPING = 1e-11  # of normal equations, as a share of their trace
 _STICTION_SPEED = 0.1  # smoothing of Coulomb friction in exact torques [rad/s]
 
 
@@ -72,17 +73,9 @@ def assemble(
     rates, omega = _at_knots(take_off.joint_velocity), _at_knots(take_off.angular_velocity)
     momentum = np.hstack([robot.mass * take_off.com_velocity, take_off.angular_momentum])  # linear first
     q = _configurations(model, take_off.com, take_off.orientation, take_off.joint_position)
-    data = robot.model.createData()
     held = np.vstack([schedule.contact, schedule.contact[-1:]])
     held[1:] |= held[:-1]  # a foot that leaves the ground starts from rest
-    v = np.array(
-        [
-            _consistent_velocity(
-                robot, data, q[k], np.concatenate([np.zeros(3), omega[k], rates[k]]), momentum[k], held[k]
-            )
-            for k in range(N + 1)
-        ]
-    )
+    v = _consistent_velocities(robot, q, np.hstack([np.zeros((N + 1, 3)), omega, rates]), momentum, held)
     flight = integrate_flight(
         model,
         reference.flight_path,
@@ -102,8 +95,7 @@ def assemble(
     alpha = take_off.angular_momentum[-1]
     flight_q = _configurations(model, com, flight.orientation, flight.joint_position)
     flight_momentum = np.hstack([robot.mass * com_velocity, np.tile(alpha, (len(flight_q), 1))])
-    in_flight = zip(flight_q, flight.joint_velocity, flight_momentum, strict=True)
-    flight_v = np.array([_flying_velocity(robot, data, *sample) for sample in in_flight])
+    flight_v = _flying_velocities(robot, flight_q, flight.joint_velocity, flight_momentum)
     q = np.vstack([q, flight_q[1:]])
     v = np.vstack([v, flight_v[1:]])
     K, n_c = len(q), robot.n_contacts
@@ -177,19 +169,19 @@ def actuator_use(plan: Plan, robot: Robot) -> ActuatorUse:
     law = robot.actuators
     data = robot.model.createData()
     dt = np.diff(plan.time)
-    torque, speed, gap = [], [], 0.0
+    v, a = 0.5 * (plan.v[:-1] + plan.v[1:]), np.diff(plan.v, axis=0) / dt[:, None]
+    tau = np.empty_like(v)
     for k in range(len(dt)):
         q = pin.interpolate(robot.model, plan.q[k], plan.q[k + 1], 0.5)
-        v = 0.5 * (plan.v[k] + plan.v[k + 1])
-        tau = pin.rnea(robot.model, data, q, v, (plan.v[k + 1] - plan.v[k]) / dt[k])
-        pin.computeJointJacobians(robot.model, data, q)
+        tau[k] = pin.rnea(robot.model, data, q, v[k], a[k])
+        if plan.contact[k].any():
+            pin.computeJointJacobians(robot.model, data, q)
         for i in np.flatnonzero(plan.contact[k]):
             J = pin.getFrameJacobian(robot.model, data, robot.contact_frames[i], pin.LOCAL_WORLD_ALIGNED)[:3]
-            tau = tau - J.T @ plan.force[k, i]
-        gap = max(gap, float(np.linalg.norm(tau[:3])))
-        speed.append(v[JOINT_VELOCITY])
-        torque.append(tau[JOINT_VELOCITY] + law.friction(speed[-1], _STICTION_SPEED))
-    torque, speed = np.array(torque), np.array(speed)
+            tau[k] -= J.T @ plan.force[k, i]
+    speed = v[:, JOINT_VELOCITY]
+    torque = tau[:, JOINT_VELOCITY] + law.friction(speed, _STICTION_SPEED)
+    gap = float(np.linalg.norm(tau[:, :3], axis=1).max())
     return ActuatorUse(
         torque=torque,
         speed=speed,
@@ -203,35 +195,47 @@ def actuator_use(plan: Plan, robot: Robot) -> ActuatorUse:
 
 def _configurations(model: BaseFrameModel, com: np.ndarray, orientation: np.ndarray, q_j: np.ndarray) -> np.ndarray:
     """Return q ``(K, nq)``: the base stands where the centre of mass asks (3.7)."""
-    com_B = np.asarray(model.com.map(len(q_j))(q_j.T)).T
-    base = com - np.einsum("kab,kb->ka", rotation.matrix(orientation), com_B)
+    base = com - np.einsum("kab,kb->ka", rotation.matrix(orientation), model.coms(q_j))
     return np.hstack([base, orientation, q_j])
 
 
 def _feet(model: BaseFrameModel, q: np.ndarray) -> np.ndarray:
     """Return the contact points ``(K, n_c, 3)`` at configurations ``(K, nq)``, in their frame."""
-    feet = np.asarray(model.feet.map(len(q))(q[:, JOINT_POSITION].T)).T.reshape(len(q), -1, 3)
-    return q[:, None, BASE_POSITION] + np.einsum("kab,kib->kia", rotation.matrix(q[:, BASE_ORIENTATION]), feet)
+    turned = np.einsum("kab,kib->kia", rotation.matrix(q[:, BASE_ORIENTATION]), model.feet_at(q[:, JOINT_POSITION]))
+    return q[:, None, BASE_POSITION] + turned
 
 
-def _consistent_velocity(
-    robot: Robot, data: pin.Data, q: np.ndarray, v: np.ndarray, momentum: np.ndarray, held: np.ndarray
+def _consistent_velocities(
+    robot: Robot, q: np.ndarray, v: np.ndarray, momentum: np.ndarray, held: np.ndarray
 ) -> np.ndarray:
-    """Return the velocity nearest to ``v`` ``(nv,)`` with this momentum ``(6,)``, linear first, and these feet at rest."""
-    A = [pin.computeCentroidalMap(robot.model, data, q).copy()]
-    pin.computeJointJacobians(robot.model, data, q)
-    pin.updateFramePlacements(robot.model, data)
-    for i in np.flatnonzero(held):
-        A.append(pin.getFrameJacobian(robot.model, data, robot.contact_frames[i], pin.LOCAL_WORLD_ALIGNED)[:3])
-    A = np.vstack(A)
-    b = np.concatenate([momentum, np.zeros(len(A) - 6)])
-    return v + np.linalg.lstsq(A, b - A @ v, rcond=1e-9)[0]
+    """Return the velocities nearest to ``v`` ``(K, nv)`` with these momenta ``(K, 6)``, linear first, and feet ``held`` at rest.
+
+    Rows may depend on each other, as those of all feet of a robot with few joints do: the normal equations are damped, and
+    solved a second time for what that left.
+    """
+    data = robot.model.createData()
+    A = np.zeros((len(q), 6 + 3 * robot.n_contacts, robot.model.nv))
+    for k in range(len(q)):
+        A[k, :6] = pin.computeCentroidalMap(robot.model, data, q[k])
+        pin.computeJointJacobians(robot.model, data, q[k])
+        pin.updateFramePlacements(robot.model, data)
+        for i in np.flatnonzero(held[k]):
+            J = pin.getFrameJacobian(robot.model, data, robot.contact_frames[i], pin.LOCAL_WORLD_ALIGNED)
+            A[k, 6 + 3 * i : 9 + 3 * i] = J[:3]
+    b = np.zeros(A.shape[:2])
+    b[:, :6] = momentum
+    transposed = A.transpose(0, 2, 1)
+    normal = A @ transposed
+    normal += _DAMPING * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(A.shape[1])
+    for _ in range(2):
+        missing = b - np.einsum("kij,kj->ki", A, v)
+        v = v + np.einsum("kij,kj->ki", transposed, np.linalg.solve(normal, missing[..., None])[..., 0])
+    return v
 
 
-def _flying_velocity(
-    robot: Robot, data: pin.Data, q: np.ndarray, joint_velocity: np.ndarray, momentum: np.ndarray
-) -> np.ndarray:
-    """Return v ``(nv,)`` with these joint rates and this momentum ``(6,)``, linear first."""
-    A = pin.computeCentroidalMap(robot.model, data, q)
-    base = np.linalg.solve(A[:, BASE_TWIST], momentum - A[:, JOINT_VELOCITY] @ joint_velocity)
-    return np.concatenate([base, joint_velocity])
+def _flying_velocities(robot: Robot, q: np.ndarray, joint_velocity: np.ndarray, momentum: np.ndarray) -> np.ndarray:
+    """Return v ``(K, nv)`` with these joint rates and these momenta ``(K, 6)``, linear first."""
+    data = robot.model.createData()
+    A = np.array([pin.computeCentroidalMap(robot.model, data, configuration).copy() for configuration in q])
+    left = momentum - np.einsum("kij,kj->ki", A[:, :, JOINT_VELOCITY], joint_velocity)
+    return np.hstack([np.linalg.solve(A[:, :, BASE_TWIST], left[..., None])[..., 0], joint_velocity])

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 
-import casadi as ca
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
@@ -69,12 +68,8 @@ def integrate_flight(
         course = make_interp_spline(times, np.vstack([joint_velocity[arms], rates, rates[-1:]]), k=1)
         dq_j[:, arms] = course(half_times)
         q_j[:, arms] = joint_position[arms] + course.antiderivative()(half_times)
-    count = len(half_times)
-    inertia = np.asarray(model.inertia.map(count)(q_j.T)).T.reshape(count, 3, 3)  # symmetric
-    legs_momentum = np.asarray(model.angular_momentum.map(count)(q_j.T, ca.DM.zeros(3, count), dq_j.T)).T
-    attitude, omega = _turned(
-        h, np.linalg.inv(inertia), legs_momentum.copy(), angular_momentum.copy(), orientation.copy()
-    )
+    inertia, legs_momentum = model.momenta(q_j, dq_j)
+    attitude, omega = _turned(h, np.linalg.inv(inertia), legs_momentum, angular_momentum.copy(), orientation.copy())
     return Flight(
         time=half_times[::2],
         orientation=attitude,

@@ -15,19 +15,21 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
+from aerial_planner import barrier
+from aerial_planner.barrier import Bounds
 from aerial_planner.riccati import LinearQuadratic
 from aerial_planner.solver import Outcome, SolverOptions
-from aerial_planner.stage import Rows, StageFunctions, StageKind
+from aerial_planner.stage import Rows, StageEvaluation, StageKind
 from aerial_planner.stagewise import StageSequence
 
 _SLOWER, _FASTER = 0.2, 1.5  # κ_μ, θ_μ of (7)
 _SCALE_MAX = 100.0  # s_max of (6)
 _TO_BOUND = 0.99  # τ_min of (8)
-_DUAL_RANGE = 1e10  # κ_Σ of (16)
 _THETA_MARGIN, _PHI_MARGIN = 1e-5, 1e-8  # γ_θ, γ_φ of (18)
 _ARMIJO, _SWITCH_THETA, _SWITCH_PHI = 1e-8, 1.1, 2.3  # η_φ, s_θ, s_φ of (19), (20)
 _THETA_LEAST, _THETA_MOST = 1e-4, 1e4  # of the first violation: below, descent decides; above, nothing is accepted
@@ -47,18 +49,18 @@ class InteriorPoint:
 
     Args:
         kinds: of each knot.
-        functions_of: the functions of a kind.
+        evaluation_of: the functions of a kind.
         options: of the method.
     """
 
     def __init__(
         self,
         kinds: Sequence[StageKind],
-        functions_of: Callable[[StageKind], StageFunctions],
+        evaluation_of: Callable[[StageKind], StageEvaluation],
         options: SolverOptions,
     ) -> None:
         self._options = options
-        self._stages = StageSequence(kinds, functions_of)
+        self._stages = StageSequence(kinds, evaluation_of)
         self._newton: dict[bytes, LinearQuadratic] = {}  # by the number of equalities of each knot
 
     def solve(self, w: np.ndarray, p: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> Outcome:
@@ -77,8 +79,10 @@ class InteriorPoint:
         n_equal = stages.n_equal + np.bincount(at_knot, minlength=len(stages.nx))
         key = n_equal.tobytes()
         if key not in self._newton:
-            self._newton[key] = LinearQuadratic(stages.nx, stages.nu, n_equal)
-        return _Iteration(self._options, stages, self._newton[key], w, lower, upper).run()
+            self._newton[key] = LinearQuadratic(stages.nx, stages.nu, n_equal, stages.links)
+        newton = self._newton[key]
+        newton.C[:] = 0.0  # where other variables may have been fixed
+        return _Iteration(self._options, stages, newton, w, lower, upper).run()
 
     def constraints(self, w: np.ndarray, p: np.ndarray) -> np.ndarray:
         """Return for each knot the misses of its dynamics, then its constraints, in one row."""
@@ -100,7 +104,7 @@ def rehearse() -> None:
         end.stage("end", x, none, none, ca.sumsqr(x), None),
     ]
     bounds = np.array([[-np.inf, 0.5, -2.0, -np.inf, -np.inf], [np.inf, 0.5, 2.0, np.inf, np.inf]])
-    InteriorPoint(kinds, StageKind.functions, SolverOptions()).solve(np.zeros(5), np.zeros(0), *bounds)
+    InteriorPoint(kinds, StageKind.interpreted, SolverOptions()).solve(np.zeros(5), np.zeros(0), *bounds)
 
 
 @dataclass
@@ -112,12 +116,22 @@ class _Point:
     cost: float
     c: np.ndarray  # of the equalities
     gap: np.ndarray  # d − s
+    theta: float  # violation
     logarithms: float  # of the slacks' distances to their bounds, summed
 
-    @property
-    def theta(self) -> float:
-        """Violation."""
-        return float(np.abs(self.c).sum() + np.abs(self.gap).sum())
+
+class _Errors(NamedTuple):
+    """Misses of the optimality conditions, scaled as in (5)."""
+
+    slope: float
+    violation: float
+    least: float  # product of distance and multiplier
+    most: float
+    per_mu: float
+
+    def of(self, mu: float) -> float:
+        """Return E_μ."""
+        return max(self.slope, self.violation, self.most - mu * self.per_mu, mu * self.per_mu - self.least)
 
 
 @dataclass
@@ -141,15 +155,16 @@ class _Iteration:
         self.fixed = np.flatnonzero(self.lower == self.upper)
         low = np.concatenate([stages.lower, self.lower[self.bounded]])
         high = np.concatenate([stages.upper, self.upper[self.bounded]])
-        self.has_low, self.has_high = np.isfinite(low), np.isfinite(high)
-        self.low, self.high = np.where(self.has_low, low, 0.0), np.where(self.has_high, high, 0.0)
+        self.bounds = Bounds.of(low, high)
+        self.n_bounds = self.bounds.count
         self.unequal = np.flatnonzero(~stages.equality)
         self.equal = np.flatnonzero(stages.equality)
         self.mu = self.options.initial_barrier
         w = np.where(self.lower == self.upper, self.lower, self.w)
         stages.evaluate(w)
-        s = self._pushed(self._inequalities(w))
-        self.z_low, self.z_high = self.has_low.astype(float), self.has_high.astype(float)
+        s = self.bounds.pushed(self._inequalities(w), self.options.bound_distance)
+        self.z_low, self.z_high = self.bounds.has_low.astype(float), self.bounds.has_high.astype(float)
+        self.weight, self.slope = np.empty_like(s), np.empty_like(s)  # Σ of the barrier and its gradient, at the point
         self.lam, self.nu = np.zeros(len(stages.miss) + len(self.equal) + len(self.fixed)), self.z_high - self.z_low
         self.point = self._at(w, s)
         self._limits = (max(1.0, self.point.theta) * _THETA_LEAST, max(1.0, self.point.theta) * _THETA_MOST)
@@ -162,13 +177,13 @@ class _Iteration:
             if not np.isfinite(self._phi(self.point)):
                 status = "not finite"
                 break
-            violation = max(_largest(self.point.c), _largest(self.point.gap))
-            if self._error(0.0) <= options.tolerance and violation <= _VIOLATION * options.tolerance:
+            errors = self._errors()
+            if errors.of(0.0) <= options.tolerance and errors.violation <= _VIOLATION * options.tolerance:
                 status = "solved"
                 break
             if iteration == options.max_iterations:
                 break
-            self._lower_barrier()
+            self._lower_barrier(errors)
             if not self._step():
                 status = "no step"
                 break
@@ -182,24 +197,15 @@ class _Iteration:
 
     # --- where we are -----------------------------------------------------------------------------------------------
 
-    def _pushed(self, d: np.ndarray) -> np.ndarray:
-        """Return d, but at some distance from the bounds."""
-        push = self.options.bound_distance
-        room = np.where(self.has_low & self.has_high, push * (self.high - self.low), np.inf)
-        least = self.low + np.minimum(push * np.maximum(1.0, np.abs(self.low)), room)
-        most = self.high - np.minimum(push * np.maximum(1.0, np.abs(self.high)), room)
-        d = np.where(self.has_low, np.maximum(d, least), d)
-        return np.where(self.has_high, np.minimum(d, most), d)
-
     def _inequalities(self, w: np.ndarray) -> np.ndarray:
         return np.concatenate([self.stages.g[self.unequal], w[self.bounded]])
 
     def _at(self, w: np.ndarray, s: np.ndarray) -> _Point:
         cost = self.stages.evaluate(w)
         c = np.concatenate([self.stages.miss, self.stages.equality_miss(), w[self.fixed] - self.lower[self.fixed]])
-        with np.errstate(invalid="ignore", divide="ignore"):
-            logarithms = np.log(s - self.low)[self.has_low].sum() + np.log(self.high - s)[self.has_high].sum()
-        return _Point(w=w, s=s, cost=cost, c=c, gap=self._inequalities(w) - s, logarithms=float(logarithms))
+        gap = self._inequalities(w) - s
+        theta = barrier.total(c) + barrier.total(gap)
+        return _Point(w=w, s=s, cost=cost, c=c, gap=gap, theta=theta, logarithms=barrier.logarithms(self.bounds, s))
 
     def _phi(self, point: _Point) -> float:
         """Return cost and barrier."""
@@ -216,30 +222,20 @@ class _Iteration:
         stages.lagrangian[self.bounded] += self.nu[n_rows:]
         stages.lagrangian[self.fixed] += self.lam[n_x + n_e :]
 
-    def _error(self, mu: float) -> float:
-        """Return E_μ of (5)."""
-        to_low, to_high = self._distances(self.point.s)
-        duals = np.abs(self.lam).sum() + self.z_low.sum() + self.z_high.sum()
-        n_z = int(self.has_low.sum() + self.has_high.sum())
-        s_d = max(_SCALE_MAX, duals / max(1, len(self.lam) + n_z)) / _SCALE_MAX
-        s_c = max(_SCALE_MAX, (self.z_low.sum() + self.z_high.sum()) / max(1, n_z)) / _SCALE_MAX
-        return max(
-            _largest(self.stages.lagrangian) / s_d,
-            _largest(self.nu + self.z_low - self.z_high) / s_d,
-            _largest(self.point.c),
-            _largest(self.point.gap),
-            _largest((self.z_low * to_low - mu)[self.has_low]) / s_c,
-            _largest((self.z_high * to_high - mu)[self.has_high]) / s_c,
-        )
+    def _errors(self) -> _Errors:
+        """Return how far the point is from an optimum."""
+        z_low, z_high, point, n_z = self.z_low, self.z_high, self.point, self.n_bounds
+        duals = barrier.total(z_low) + barrier.total(z_high)
+        s_d = max(_SCALE_MAX, (barrier.total(self.lam) + duals) / max(1, len(self.lam) + n_z)) / _SCALE_MAX
+        s_c = max(_SCALE_MAX, duals / max(1, n_z)) / _SCALE_MAX
+        slope, violation = barrier.misses(self.stages.lagrangian, self.nu, z_low, z_high, point.c, point.gap)
+        least, most = barrier.products(self.bounds, point.s, z_low, z_high)
+        return _Errors(slope=slope / s_d, violation=violation, least=least / s_c, most=most / s_c, per_mu=1.0 / s_c)
 
-    def _distances(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return distances to the bounds, 1 where there are none."""
-        return np.where(self.has_low, s - self.low, 1.0), np.where(self.has_high, self.high - s, 1.0)
-
-    def _lower_barrier(self) -> None:
+    def _lower_barrier(self, errors: _Errors) -> None:
         """Go on to the next barrier problems (7) while the present one is solved well enough."""
         least = 0.1 * self.options.tolerance
-        while self.mu > least and self._error(self.mu) <= self.options.barrier_accuracy * self.mu:
+        while self.mu > least and errors.of(self.mu) <= self.options.barrier_accuracy * self.mu:
             self.mu = max(least, min(_SLOWER * self.mu, self.mu**_FASTER))
             self.filter = []
 
@@ -248,6 +244,7 @@ class _Iteration:
     def _step(self) -> bool:
         """Take one step; return False if there is none that the filter accepts."""
         point = self.point
+        barrier.derivatives(self.bounds, point.s, self.z_low, self.z_high, self.mu, self.weight, self.slope)
         direction = self._direction(point.c, point.gap)
         while direction is not None:
             dw, ds, lam, nu = direction
@@ -267,9 +264,7 @@ class _Iteration:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
         """Return the Newton step of w and s for these residuals, and the multipliers after it; None if there is none."""
         stages, newton, n_rows = self.stages, self.newton, len(self.unequal)
-        to_low, to_high = self._distances(self.point.s)
-        weight = self.z_low / to_low + self.z_high / to_high
-        slope = self.mu * (self.has_high / to_high - self.has_low / to_low)
+        weight, slope = self.weight, self.slope
         pull = weight * gap + slope
         q, diagonal = stages.gradient.copy(), np.full(len(self.w), curvature)
         q[self.bounded] += pull[n_rows:]
@@ -299,17 +294,17 @@ class _Iteration:
 
     def _to_bounds(self, ds: np.ndarray) -> float:
         """Return how much of the step the slacks allow (15a)."""
-        to_low, to_high = self._distances(self.point.s)
-        keep = max(_TO_BOUND, 1.0 - self.mu)
-        return min(_share(to_low, ds, self.has_low, keep), _share(to_high, -ds, self.has_high, keep))
+        return barrier.step_length(self.bounds, self.point.s, ds, self._keep)
+
+    @property
+    def _keep(self) -> float:
+        """Share of a distance that a step may use up, τ of (8)."""
+        return max(_TO_BOUND, 1.0 - self.mu)
 
     def _search(self, dw: np.ndarray, ds: np.ndarray) -> tuple[float, _Point] | None:
         """Return how far along the step to go, and the point there (section 2.3); None: nowhere."""
         point = self.point
-        to_low, to_high = self._distances(point.s)
-        descent = float(self.stages.gradient @ dw) + float(
-            self.mu * (self.has_high / to_high - self.has_low / to_low) @ ds
-        )
+        descent = float(self.stages.gradient @ dw + self.slope @ ds)
         longest = length = self._to_bounds(ds)
         while length > _SHORTEST * longest:
             trial = self._at(point.w + length * dw, point.s + length * ds)
@@ -365,31 +360,8 @@ class _Iteration:
 
     def _move_multipliers(self, point: _Point, length: float, ds: np.ndarray, lam: np.ndarray, nu: np.ndarray) -> None:
         """Move the multipliers of the point that was left (14), and keep those of bounds in range (16)."""
-        to_low, to_high = self._distances(point.s)
-        dz_low = np.where(self.has_low, (self.mu - self.z_low * ds) / to_low - self.z_low, 0.0)
-        dz_high = np.where(self.has_high, (self.mu + self.z_high * ds) / to_high - self.z_high, 0.0)
-        keep = max(_TO_BOUND, 1.0 - self.mu)
-        dual_length = min(
-            _share(self.z_low, dz_low, self.has_low, keep), _share(self.z_high, dz_high, self.has_high, keep)
-        )
         self.lam += length * (lam - self.lam)
         self.nu += length * (nu - self.nu)
-        to_low, to_high = self._distances(self.point.s)
-        for z, dz, distance, has in (
-            (self.z_low, dz_low, to_low, self.has_low),
-            (self.z_high, dz_high, to_high, self.has_high),
-        ):
-            z += dual_length * dz
-            z[:] = np.where(has, np.clip(z, self.mu / (_DUAL_RANGE * distance), _DUAL_RANGE * self.mu / distance), 0.0)
-
-
-def _largest(a: np.ndarray) -> float:
-    return float(np.abs(a).max(initial=0.0))
-
-
-def _share(distance: np.ndarray, change: np.ndarray, bounded: np.ndarray, keep: float) -> float:
-    """Return the largest share of a change, at most 1, that uses up no more than ``keep`` of any distance."""
-    shrinking = bounded & (change < 0.0)
-    if not shrinking.any():
-        return 1.0
-    return float(min(1.0, np.min(-keep * distance[shrinking] / change[shrinking])))
+        barrier.move_multipliers(
+            self.bounds, point.s, self.point.s, ds, self.z_low, self.z_high, self.mu, self._keep
+        )

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import casadi as ca
 import numpy as np
 
+from aerial_model.compiled import cholesky, cholesky_solve, compiled
 from aerial_model.robot import Robot
-from aerial_planner.in_place import InPlace
+from aerial_planner.in_place import Batch, Pointwise, interpreted
 from aerial_planner.symbolic import BaseFrameModel
 
 _ITERATIONS = 12
@@ -18,13 +21,14 @@ _STEP_MIN = 1e-5  # [rad] that is not worth another: the next would be its squar
 class InverseKinematics:
     """Solves for the feet's positions relative to the centre of mass, in base axes."""
 
-    def __init__(self, robot: Robot, model: BaseFrameModel) -> None:
+    def __init__(
+        self, robot: Robot, model: BaseFrameModel, compiled: Callable[[ca.Function], Pointwise | None] = interpreted
+    ) -> None:
         q = ca.SX.sym("q", robot.n_joints)
         relative = ca.reshape(model.feet(q) - ca.repmat(model.com(q), 1, robot.n_contacts), -1, 1)
-        outputs = [relative, ca.densify(ca.jacobian(relative, q))]
-        self._feet = ca.Function("feet_from_com", [q], outputs, {"cse": True})
-        self._mapped: dict[int, InPlace] = {}  # by the number of configurations
+        self.feet = Batch(ca.Function("feet_from_com", [q], [relative, ca.jacobian(relative, q)]), compiled)
         self._range = robot.planning_range
+        self.solve(np.zeros((1, robot.n_contacts, 3)), robot.poses["home"])  # so that no plan waits for Numba
 
     def solve(self, feet_from_com: np.ndarray, guess: np.ndarray) -> np.ndarray:
         """Return joint positions ``(K, n)`` [rad] inside the planning range.
@@ -36,18 +40,45 @@ class InverseKinematics:
         targets = feet_from_com.reshape(len(feet_from_com), -1)
         q = np.broadcast_to(guess, (len(targets), np.shape(guess)[-1])).copy()
         K, n = q.shape
-        if K not in self._mapped:
-            self._mapped[K] = InPlace(self._feet, K)
-        mapped = self._mapped[K]
-        (q_in,), (feet, J) = mapped.arguments, mapped.results
-        J = J.reshape(K, n, -1)  # transposed blocks, Jᵀ of each
+        (q_in,), (feet, J), evaluate = self.feet.memory(K)
+        feet, J = feet.reshape(K, -1), J.reshape(K, n, -1)  # transposed blocks, Jᵀ of each
         for _ in range(_ITERATIONS):
             q_in[:] = q.ravel()
-            mapped.evaluate()
-            error = targets - feet.reshape(K, -1)  # (K, 3 n_c)
-            normal = J @ J.transpose(0, 2, 1) + _DAMPING * np.eye(n)
-            step = np.linalg.solve(normal, (J @ error[..., None]))[..., 0]
-            before, q = q, np.clip(q + np.clip(step, -_STEP_MAX, _STEP_MAX), *self._range)
-            if np.max(np.abs(q - before)) < _STEP_MIN:
+            evaluate()
+            if _step(q, J, targets, feet, *self._range) < _STEP_MIN:
                 break
         return q
+
+
+@compiled
+def _step(
+    q: np.ndarray, J: np.ndarray, targets: np.ndarray, feet: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> float:
+    """Move each configuration ``(K, n)`` by a step, inside its range, and return the largest change of an angle.
+
+    Args:
+        q: configurations.
+        J: transposed Jacobians of the feet ``(K, n, m)``.
+        targets: where they should be ``(K, m)``.
+        feet: where they are ``(K, m)``.
+        low: least angles ``(n,)``.
+        high: greatest angles.
+    """
+    K, n, m = J.shape
+    L, step, largest = np.empty((n, n)), np.empty((n, 1)), 0.0
+    for k in range(K):
+        normal = np.dot(J[k], J[k].T)
+        for i in range(n):
+            normal[i, i] += _DAMPING
+            step[i, 0] = 0.0
+            for j in range(m):
+                step[i, 0] += J[k, i, j] * (targets[k, j] - feet[k, j])
+        cholesky(normal, L)
+        cholesky_solve(L, step)
+        for i in range(n):
+            to = q[k, i] + min(max(step[i, 0], -_STEP_MAX), _STEP_MAX)
+            to = min(max(to, low[i]), high[i])
+            largest = max(largest, abs(to - q[k, i]))
+            q[k, i] = to
+    return largest
+

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from aerial_model.robot import Robot
@@ -57,7 +55,7 @@ class KinoDynamic(KinoDynamicKinds):
         reference: Reference,
         guess: TakeOffTrajectory,
         margin: Margin,
-        inertia: Sequence[LegInertia],
+        inertia: LegInertia,
     ) -> list[StageData]:
         knots = self._take_off_stages(schedule, reference, guess, margin, inertia)
         return [*knots, *self._flight_stages(schedule, reference, guess, margin)]
@@ -79,7 +77,7 @@ class KinoDynamic(KinoDynamicKinds):
         reference: Reference,
         guess: TakeOffTrajectory,
         margin: Margin,
-        inertia: Sequence[LegInertia],
+        inertia: LegInertia,
     ) -> list[StageData]:
         """Return the numbers of the knots on the ground, the lift-off's included."""
         robot, settings = self.robot, self.settings
@@ -100,24 +98,26 @@ class KinoDynamic(KinoDynamicKinds):
         ends = np.append(np.diff(schedule.phase) != 0, False)
         ground = np.tile(reference.foot_position, (N + 1, 1, 1))  # and above which height feet in the air must be
         ground[..., 2] += reference.foot_clearance
+        given = [reference.com, reference.com_velocity, reference.orientation, reference.joint_position]
+        p = np.hstack(
+            [
+                np.full((N, 1), schedule.dt),
+                *(rows[:N] for rows in given),
+                np.tile(reference.x_0[-n:], (N, 1)),
+                ground[:N].reshape(N, -1),
+                np.tile(np.concatenate([reference.x_0, np.zeros(n), margin.take_off]), (N, 1)),
+                inertia.parameters,
+            ]
+        )
+        least_force = np.tile([-np.inf, -np.inf, settings.force_min], self.robot.n_contacts)
+        greatest_force = np.tile([np.inf, np.inf, settings.force_max], self.robot.n_contacts)
+        unbounded = np.full(3, np.inf)
         stages = []
         for k in range(N):
             loaded = schedule.contact[k]
-            n_f = int(loaded.sum())
-            p = [[schedule.dt], reference.com[k], reference.com_velocity[k], reference.orientation[k]]
-            p += [
-                reference.joint_position[k],
-                reference.x_0[-n:],
-                ground[k].ravel(),
-                reference.x_0,
-                np.zeros(n),
-                margin.take_off,
-                inertia[k].parameters,
-            ]
+            n_f = 3 * int(loaded.sum())
             u = [guess.angular_velocity[k], guess.joint_velocity[k], guess.force[k][loaded].ravel()]
-            force_min = np.tile([-np.inf, -np.inf, settings.force_min], n_f)
-            force_max = np.tile([np.inf, np.inf, settings.force_max], n_f)
-            u_min, u_max = [np.full(3, -np.inf), -speed, force_min], [np.full(3, np.inf), speed, force_max]
+            u_min, u_max = [-unbounded, -speed, least_force[:n_f]], [unbounded, speed, greatest_force[:n_f]]
             if k == N - 1:
                 free = np.full(holding.sum(), np.inf)
                 u, u_min, u_max = [*u, guess.joint_velocity[-1][holding]], [*u_min, -free], [*u_max, free]
@@ -125,7 +125,7 @@ class KinoDynamic(KinoDynamicKinds):
                 u, u_min, u_max = [*u, stretch[k + 1]], [*u_min, least[k + 1]], [*u_max, greatest[k + 1]]
             stages.append(
                 StageData(
-                    p=np.concatenate(p),
+                    p=p[k],
                     x=x[k],
                     x_min=x_min[k],
                     x_max=x_max[k],
@@ -135,9 +135,10 @@ class KinoDynamic(KinoDynamicKinds):
                 )
             )
         path = reference.flight_path
+        last = LegInertia.along(self._whole, guess.joint_position[-1:])[0]
         p = [
             *([schedule.dt], ground[N].ravel(), [schedule.flight_time], reference.landing_com, path.parameters(0)),
-            *(margin.flight, LegInertia.at(self._whole, guess.joint_position[-1]).joint.ravel(order="F")),
+            *(margin.flight, last.parameters[: last.joint.size]),
             path.onset(schedule.flight_time),
         ]
         bounds = {"x_min": x_min[N], "x_max": x_max[N]}
@@ -178,8 +179,9 @@ class KinoDynamic(KinoDynamicKinds):
         _, rate = path.at(start, middle, T)
         _, both = path.from_take_off(start, guess.joint_velocity[-1], middle, T)
         limits = []
+        along = LegInertia.along(self._whole, guess.flight_joint_position)
         for k in range(1, M):
-            inertia = LegInertia.at(self._whole, guess.flight_joint_position[k]).joint[joints]
+            inertia = along.joint[k, joints]
             folding, total = (rate[k] - rate[k - 1]) / dt, (both[k] - both[k - 1]) / dt
             torques = inertia[:, legs] @ (total - folding)[legs], inertia[:, legs] @ folding[legs] * T**2
             limits.append(np.concatenate([inertia[:, arms].ravel(order="F"), *torques, margin.flight[joints]]))
@@ -242,7 +244,7 @@ class KinoDynamic(KinoDynamicKinds):
         )
 
 
-def leg_inertia_along(robot: Robot, guess: TakeOffTrajectory) -> list[LegInertia]:
+def leg_inertia_along(robot: Robot, guess: TakeOffTrajectory) -> LegInertia:
     """Return what the torque limits count of the legs' inertia on each take-off interval: its value at the guess."""
     middle = 0.5 * (guess.joint_position[:-1] + guess.joint_position[1:])
-    return [LegInertia.at(robot, q_j) for q_j in middle]
+    return LegInertia.along(robot, middle)

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from aerial_model import rotation
-from aerial_model.kinematics import Kinematics
 from aerial_model.robot import BASE_TWIST, JOINT_VELOCITY, Robot
 from aerial_planner.schedule import GRAVITY
 from aerial_planner.symbolic import BaseFrameModel, quaternion_product, quaternion_step, rotation_matrix
@@ -34,13 +32,17 @@ class LegInertia:
     wrench_share: Matrix  # H_jb H_bb⁻¹ (n, 6), linear first
 
     @staticmethod
-    def at(robot: Robot, q_j: np.ndarray) -> LegInertia:
-        """Return it for a robot whose planned joints are at ``q_j`` ``(n_p,)`` [rad]."""
-        q = np.concatenate([np.zeros(3), rotation.IDENTITY, robot.with_held(q_j)])
-        M = Kinematics(robot).at(q, np.zeros(robot.model.nv)).M
-        share = np.linalg.solve(M[BASE_TWIST, BASE_TWIST], M[BASE_TWIST, JOINT_VELOCITY]).T
-        joint = M[JOINT_VELOCITY, JOINT_VELOCITY] - share @ M[BASE_TWIST, JOINT_VELOCITY]
-        return LegInertia(joint=joint[:, robot.planned_joints], wrench_share=share)
+    def along(robot: Robot, q_j: np.ndarray) -> LegInertia:
+        """Return K of them in arrays, for a robot whose planned joints are at each of ``q_j`` ``(K, n_p)`` [rad]."""
+        M = robot.mass_matrices(robot.with_held(q_j))
+        coupling = M[:, BASE_TWIST, JOINT_VELOCITY]
+        share = np.linalg.solve(M[:, BASE_TWIST, BASE_TWIST], coupling).transpose(0, 2, 1)
+        joint = M[:, JOINT_VELOCITY, JOINT_VELOCITY] - share @ coupling
+        return LegInertia(joint=joint[:, :, robot.planned_joints], wrench_share=share)
+
+    def __getitem__(self, k: int) -> LegInertia:
+        """Return one of K."""
+        return LegInertia(joint=self.joint[k], wrench_share=self.wrench_share[k])
 
     @staticmethod
     def symbols(n: int, n_p: int) -> LegInertia:
@@ -49,9 +51,9 @@ class LegInertia:
 
     @property
     def parameters(self) -> Matrix:
-        """All numbers as one column, which ``symbols`` stand for."""
+        """All numbers as one column, which ``symbols`` stand for; of K a row each."""
         if isinstance(self.joint, np.ndarray):
-            return np.concatenate([part.ravel(order="F") for part in (self.joint, self.wrench_share)])
+            return np.concatenate([_by_columns(part) for part in (self.joint, self.wrench_share)], axis=-1)
         return ca.vertcat(ca.vec(self.joint), ca.vec(self.wrench_share))
 
     def torque(self, ddq_j: ca.SX, force_B: ca.SX, feet_B: ca.SX) -> ca.SX:
@@ -64,6 +66,11 @@ class LegInertia:
         """
         moment = sum((ca.cross(feet_B[:, i], force_B[:, i]) for i in range(force_B.shape[1])), type(force_B).zeros(3))
         return ca.mtimes(self.joint, ddq_j) + ca.mtimes(self.wrench_share, ca.vertcat(ca.sum2(force_B), moment))
+
+
+def _by_columns(matrices: np.ndarray) -> np.ndarray:
+    """Return the entries of matrices ``(..., m, n)``, column by column ``(..., m n)``."""
+    return matrices.swapaxes(-1, -2).reshape(*matrices.shape[:-2], -1)
 
 
 class TakeOffKnot:

@@ -6,14 +6,14 @@ scattered into the flat matrices, and handed to ``nlpsol`` through its function 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 
 from aerial_planner.solver import Outcome, SolverName, SolverOptions
-from aerial_planner.stage import StageFunctions, StageKind
+from aerial_planner.stage import StageKind
 
 _NLP_GRAD_OUTPUTS = ["f", "g", "grad_gamma_x", "grad_gamma_p"]
 
@@ -25,16 +25,10 @@ class FlatProgram:
 
     Args:
         kinds: of each knot.
-        functions_of: the functions of a kind.
         options: of the solver, FATROP or IPOPT.
     """
 
-    def __init__(
-        self,
-        kinds: Sequence[StageKind],
-        functions_of: Callable[[StageKind], StageFunctions],
-        options: SolverOptions,
-    ) -> None:
+    def __init__(self, kinds: Sequence[StageKind], options: SolverOptions) -> None:
         self.kinds = list(kinds)
         self._nx = [kind.x.numel() for kind in kinds]
         self._nu = [kind.u.numel() for kind in kinds]
@@ -48,7 +42,7 @@ class FlatProgram:
         self._upper = np.concatenate([np.concatenate([zero, up]) for zero, _, up in rows])
         self._w, self._p = ca.MX.sym("w", int(self._z_0[-1])), ca.MX.sym("p", int(self._p_0[-1]))
         self._name = SolverName(options.solver)
-        self.functions = self._make_functions(functions_of)  # under the names that CasADi's interface looks for
+        self.functions = self._make_functions()  # under the names that CasADi's interface looks for
         self._solver = self._make_solver(options)
 
     def solve(self, w: np.ndarray, p: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> Outcome:
@@ -101,14 +95,14 @@ class FlatProgram:
             found.setdefault(id(kind), (kind, []))[1].append(k)
         return list(found.values())
 
-    def _make_functions(self, functions_of: Callable[[StageKind], StageFunctions]) -> dict[str, ca.Function]:
+    def _make_functions(self) -> dict[str, ca.Function]:
         w, p = self._w, self._p
         n_w, n_g = w.numel(), len(self._lower)
         lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", n_g)
         cost = ca.MX(0)
         g, gradient, jacobian, lagrangian_gradient, hessian = ([] for _ in range(5))  # lists of _Blocks
         for kind, knots in self._groups():
-            n, stage = len(knots), functions_of(kind)
+            n, stage = len(knots), kind.functions()
             z_0, row_0 = self._z_0[knots], self._row_0[knots]
             row_g = row_0 + kind.n_next
             z, parameters = _gather(w, z_0, kind.z.numel()), _gather(p, self._p_0[knots], kind.p.numel())

@@ -27,9 +27,9 @@ from aerial_planner.checks import (
 )
 from aerial_planner.collision import CollisionModel
 from aerial_planner.compiled import FunctionLibrary
+from aerial_planner.in_place import interpreted
 from aerial_planner.inverse_kinematics import InverseKinematics
 from aerial_planner.kino_dynamic import KinoDynamic
-from aerial_planner.knots import LegInertia
 from aerial_planner.limits import Margin, Variant
 from aerial_planner.plan_library import PlanLibrary
 from aerial_planner.reference import Reference, body_reference
@@ -140,11 +140,11 @@ class Planner:
             raise ConfigurationError(f"solver: expected one of {', '.join(SolverName)}, found '{solver}'")
         self.options = SolverOptions(solver=solver, tolerance=_TOLERANCE, max_iterations=_ITERATIONS_MAX)
         self._body = robot.planned
-        self._model = base_frame_model(self._body)
+        compiled = self._library.load_function if self._library else interpreted
+        self._model = base_frame_model(self._body, compiled)
         interior_point.rehearse()
         flight.rehearse()
-        LegInertia.at(robot, self._body.poses["home"])  # rehearsed, too
-        self._ik = InverseKinematics(self._body, self._model)
+        self._ik = InverseKinematics(self._body, self._model, compiled)
         self._srbm = SingleRigidBody(self._body, self._model, self._ik, self.settings, self.options, self._library)
         self._collisions = CollisionModel(robot)
         self._kino_dynamic: dict[tuple[Variant, bool], KinoDynamic] = {}
@@ -178,11 +178,11 @@ class Planner:
             self._stage(request).problem(schedule, near=True)
 
     def compile(self, requests: Iterable[MotionRequest], progress: Callable[[str], None]) -> int:
-        """Compile what plans of these requests evaluate, unless it is there; return how many stage kinds that were.
+        """Compile what plans of these requests evaluate, unless it is there; return how many libraries that were.
 
         Args:
             requests: one of each contact schedule and variant.
-            progress: told the name of each kind before it is compiled.
+            progress: told the name of each before it is compiled.
 
         Raises:
             CompilationError: if there is no C compiler, or it fails.
@@ -200,6 +200,8 @@ class Planner:
             if self._library.load(kind) is None:
                 progress(name)
                 compiled += self._library.compile(kind)
+        for batch in (*self._model.batches, self._ik.feet):
+            compiled += self._library.compile_function(batch.function)
         return compiled
 
     def _plan(

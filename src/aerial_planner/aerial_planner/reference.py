@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
 
 from aerial_model import rotation
-from aerial_model.kinematics import Kinematics
 from aerial_model.robot import BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY, Robot
 from aerial_planner.inverse_kinematics import InverseKinematics
 from aerial_planner.schedule import GRAVITY, Schedule
@@ -122,7 +120,7 @@ def body_reference(
     quaternion = q_start[BASE_ORIENTATION]
     R = rotation.matrix(quaternion)
     feet = robot.contact_positions(q_start)
-    com_0 = feet[0] - R @ (np.asarray(model.feet(q_j))[:, 0] - np.asarray(model.com(q_j)).ravel())
+    com_0 = feet[0] - R @ (model.feet_at(q_j[None])[0, 0] - model.coms(q_j[None])[0])
     landing_feet, height = _landing_stance(robot, model)
 
     landing_com = schedule.landing_centre + [0.0, 0.0, height]
@@ -130,7 +128,8 @@ def body_reference(
     lift_off = com_0 + [0.0, 0.0, _LIFT_OFF_RISE * height]
     velocity = (landing_com - lift_off) / T + [0.0, 0.0, 0.5 * GRAVITY * T]
     R_landing = rotation.matrix(schedule.landing_orientation)
-    inertia = np.asarray(model.inertia(robot.poses["home"]))
+    home = robot.poses["home"][None]
+    inertia = model.momenta(home, np.zeros_like(home))[0][0]
     turning_on = R_landing @ inertia @ R_landing.T @ schedule.rotation * (1 - schedule.rotation_at_lift_off) / T
     lead, lead_time, speed = _landing_lead(
         landing_feet @ R_landing.T, height, landing_com - lift_off, turning_on / robot.mass, schedule, settings
@@ -175,8 +174,8 @@ def body_reference(
 
 def _landing_stance(robot: Robot, model: BaseFrameModel) -> tuple[np.ndarray, float]:
     """Return the feet ``(n_c, 3)`` from the centre of mass in the level landing pose, centred below it, and its height."""
-    pose = robot.poses["landing"]
-    feet = np.asarray(model.feet(pose)).T - np.asarray(model.com(pose)).ravel()
+    pose = robot.poses["landing"][None]
+    feet = model.feet_at(pose)[0] - model.coms(pose)
     feet = feet - [*feet[:, :2].mean(axis=0), 0.0]
     radius = np.mean([point.radius for point in robot.contact_points])
     return feet, float(radius - feet[:, 2].mean())
@@ -268,8 +267,8 @@ def _landing(
     per_metre = (ik.solve(targets + _LITTLE * up, poses) - poses) / _LITTLE  # [rad/m]
     rates = ((fall + depths / flight_time) * _rigid_share(robot, poses, per_metre))[:, None] * per_metre
     reaches = poses - 0.5 * share * flight_time * rates
-    relative = [np.asarray(model.feet(q) - ca.repmat(model.com(q), 1, len(feet))).T for q in poses]
-    missing = np.linalg.norm(np.array(relative) - targets, axis=2).max(axis=1)
+    relative = model.feet_at(poses) - model.coms(poses)[:, None]
+    missing = np.linalg.norm(relative - targets, axis=2).max(axis=1)
     low, high = robot.planning_range
     haste = np.max(np.abs(rates) / (_FOLDING_SPEED * robot.actuators.no_load_speed), axis=1)
     supple = np.all((low <= reaches) & (reaches <= high), axis=1) & (haste <= 1.0)
@@ -286,12 +285,8 @@ def _rigid_share(robot: Robot, poses: np.ndarray, rates: np.ndarray) -> np.ndarr
 
     It is 0 where the impact is harmless.
     """
-    kinematics, still = Kinematics(robot), np.zeros(robot.model.nv)
-    standing = np.concatenate([np.zeros(6), [1.0]])
-    mu = np.empty(len(poses))
-    for k, (pose, rate) in enumerate(zip(poses, rates, strict=True)):
-        M = kinematics.at(np.concatenate([standing, pose]), still).M[JOINT_VELOCITY, JOINT_VELOCITY]
-        mu[k] = rate @ M @ rate / robot.mass
+    M = robot.mass_matrices(poses)[:, JOINT_VELOCITY, JOINT_VELOCITY]
+    mu = np.einsum("ki,kij,kj->k", rates, M, rates) / robot.mass
     share = mu / (1 + mu)
     return np.where(share < _HARMLESS, 0.0, share)
 

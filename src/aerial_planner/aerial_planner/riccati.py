@@ -14,9 +14,11 @@ Stages differ in size, so what belongs to them lies in arrays with a row for eac
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from aerial_model.compiled import cholesky, cholesky_solve, compiled
+from aerial_model.compiled import cholesky, compiled, reordered
 
 _RANK = 1e-9  # a pivot smaller than this share of the largest coefficient is none
 
@@ -28,21 +30,26 @@ class LinearQuadratic:
         nx: states of each stage ``(K,)``; the last one leads nowhere.
         nu: its controls.
         nc: its equality constraints.
+        links: row and column of each nonzero of its F ``(n, 2)``; few, as Euler steps have.
     """
 
-    def __init__(self, nx: np.ndarray, nu: np.ndarray, nc: np.ndarray) -> None:
+    def __init__(self, nx: np.ndarray, nu: np.ndarray, nc: np.ndarray, links: Sequence[np.ndarray]) -> None:
         self.nx, self.nu, self.nc = (np.array(n, dtype=np.int64) for n in (nx, nu, nc))
         K, x, c = len(nx), int(max(nx)), int(max(nc))
         y = int(max(self.nx + self.nu))
         self.Q, self.q = np.zeros((K, y, y)), np.zeros((K, y))
-        self.F, self.f = np.zeros((K, x, y)), np.zeros((K, x))
+        self.n_links = np.array([len(pairs) for pairs in links], dtype=np.int64)
+        self.links = np.zeros((K, max(self.n_links), 2), dtype=np.int64)
+        for k, pairs in enumerate(links):
+            self.links[k, : len(pairs)] = pairs
+        self.F, self.f = np.zeros(self.links.shape[:2]), np.zeros((K, x))  # the nonzeros
         self.C, self.c = np.zeros((K, c, y)), np.zeros((K, c))
         self.y = np.zeros((K, y))  # solution
         self.dynamics = np.zeros((K, x))  # multipliers of x_k+1 − F_k y_k − f_k = 0
         self.constraints = np.zeros((K, c))  # multipliers of C_k y_k + c_k = 0
         rows = c + x  # of a stage: its own and those of the state after it
         self._factor = (
-            np.zeros((K, x, x + 1)),  # P, p: the cost to go
+            np.zeros((K + 1, x, x + 1)),  # P, p: the cost to go
             np.zeros((K + 1, rows, x + 1)),  # H, h: what is asked of the state
             np.zeros(K + 1, dtype=np.int64),  # how many rows that has
             np.zeros((K + 1, rows), dtype=np.int64),  # which of the stage's rows they are
@@ -62,61 +69,130 @@ class LinearQuadratic:
     def solve(self) -> bool:
         """Write the solution and the multipliers; return False if there is no minimum: a direction has no curvature."""
         sizes = self.nx, self.nu, self.nc
-        if not _backward(*sizes, self.Q, self.q, self.F, self.f, self.C, self.c, self._factor):
+        steps = self.n_links, self.links, self.F, self.f
+        if not _backward(*sizes, *steps, self.Q, self.q, self.C, self.c, self._factor):
             return False
-        _forward(*sizes, self.F, self.f, self.y, self.dynamics, self.constraints, self._factor)
+        _forward(*sizes, *steps, self.y, self.dynamics, self.constraints, self._factor)
         return True
 
 
-@compiled
-def _reduce(rows: np.ndarray, n: int, order: np.ndarray) -> int:
-    """Bring the first ``n`` columns of ``rows`` to [1 S; 0 0] by full pivoting; return the rank.
+@reordered
+def _largest_row(rows: np.ndarray, first: int, end: int) -> tuple:
+    """Return which row from ``first`` to ``end`` has the largest entry, and the size of that."""
+    best, at = -1.0, first
+    for i in range(first, end):
+        size = 0.0
+        for j in range(rows.shape[1]):
+            entry = abs(rows[i, j])
+            size = entry if entry > size else size
+        if size > best:
+            best, at = size, i
+    return at, best
 
-    Columns change places, and ``order`` with them.
+
+@compiled
+def _reduce(U: np.ndarray, T: np.ndarray, order: np.ndarray) -> int:
+    """Bring rows U ``(m, n)`` to [1 S; 0 0] by full pivoting, and the unit matrix T to what does that; return the rank.
+
+    Columns change places, and ``order`` with them. With less than full pivoting errors grow from knot to knot.
     """
-    m, width = rows.shape
-    least = 0.0
-    for i in range(m):
-        for j in range(n):
-            least = max(least, abs(rows[i, j]))
-    least *= _RANK
+    m, n = U.shape
+    for i in range(m - 1, -1, -1):
+        if not np.any(U[i]):  # nothing to eliminate with: to the end
+            m -= 1
+            if i != m:
+                for j in range(n):
+                    U[i, j], U[m, j] = U[m, j], U[i, j]
+                for j in range(len(T)):
+                    T[i, j], T[m, j] = T[m, j], T[i, j]
+    largest = 0.0
     for k in range(min(m, n)):
-        best, at_row, at_column = least, -1, -1
-        for i in range(k, m):
-            for j in range(k, n):
-                if abs(rows[i, j]) > best:
-                    best, at_row, at_column = abs(rows[i, j]), i, j
-        if at_row < 0:
+        at_row, best = _largest_row(U, k, m)
+        largest = max(largest, best)
+        if not best > _RANK * largest:
             return k
+        at_column = k
+        for j in range(n):
+            if abs(U[at_row, j]) == best:
+                at_column = j
+                break
         if at_row != k:
-            for j in range(width):
-                rows[k, j], rows[at_row, j] = rows[at_row, j], rows[k, j]
+            for j in range(n):
+                U[k, j], U[at_row, j] = U[at_row, j], U[k, j]
+            for j in range(len(T)):
+                T[k, j], T[at_row, j] = T[at_row, j], T[k, j]
         if at_column != k:
             order[k], order[at_column] = order[at_column], order[k]
             for i in range(m):
-                rows[i, k], rows[i, at_column] = rows[i, at_column], rows[i, k]
-        scale = 1.0 / rows[k, k]
-        for j in range(k, width):
-            rows[k, j] *= scale
+                U[i, k], U[i, at_column] = U[i, at_column], U[i, k]
+        pivot, pivot_T = U[k, k:], T[k]
+        scale = 1.0 / pivot[0]
+        for j in range(n - k):  # loops are vectorized if they start at 0
+            pivot[j] *= scale
+        for j in range(len(T)):
+            pivot_T[j] *= scale
         for i in range(m):
-            factor = rows[i, k]
+            row, row_T = U[i, k:], T[i]
+            factor = row[0]
             if i != k and factor != 0.0:
-                for j in range(k, width):
-                    rows[i, j] -= factor * rows[k, j]
+                for j in range(n - k):
+                    row[j] -= factor * pivot[j]
+                for j in range(len(T)):
+                    row_T[j] -= factor * pivot_T[j]
     return min(m, n)
 
 
 @compiled
-def _reduced(Q: np.ndarray, N: np.ndarray, rank: int, Y: np.ndarray) -> np.ndarray:
-    """Return ½ [v; 1]ᵀ Q [v; 1] as a matrix of the variables after the first ``rank``, which are −N times these.
+def _add_cost_to_go(M: np.ndarray, P: np.ndarray, links: np.ndarray, F: np.ndarray, f: np.ndarray) -> None:
+    """Add that of the next state, ½ [x; 1]ᵀ P [x; 1] with x = F y + f, to ½ [y; 1]ᵀ M [y; 1]."""
+    x, y = len(P) - 1, len(M) - 1
+    W = np.zeros((y + 1, x))  # of the slope by x, from [y; 1]
+    for n in range(len(links)):
+        i, j = links[n, 0], links[n, 1]
+        for a in range(x):
+            W[j, a] += F[n] * P[i, a]
+    for i in range(x + 1):
+        factor = f[i] if i < x else 1.0
+        for a in range(x):
+            W[y, a] += factor * P[i, a]
+    across = np.ascontiguousarray(W.T)
+    for n in range(len(links)):
+        i, j = links[n, 0], links[n, 1]
+        for a in range(y + 1):
+            M[j, a] += F[n] * across[i, a]
+    for j in range(y):
+        M[y, j] = M[j, y]
 
-    Writes into Y ``(rank, ·)`` what the gradient by the first ones is, from the others.
+
+@compiled
+def _reduced(M: np.ndarray, u: int, order: np.ndarray, N: np.ndarray, Y: np.ndarray) -> np.ndarray:
+    """Return ½ [y; 1]ᵀ M [y; 1] as a matrix of all but the first ``rank`` in ``order``, which are −N times the others.
+
+    Writes into Y ``(rank, ·)`` what the slope by the first ones is, from the others. ``order`` is of the ``u`` controls.
     """
-    R = np.ascontiguousarray(Q[rank:, rank:])
-    if rank > 0:
-        Q_12 = np.ascontiguousarray(Q[:rank, rank:])
-        Y[:] = Q_12 - np.dot(np.ascontiguousarray(Q[:rank, :rank]), N)
-        R -= np.dot(N.T, np.ascontiguousarray(Y)) + np.dot(Q_12.T, N)
+    rank, n = len(N), len(M)
+    rest, free = n - rank, u - rank
+    ordered = np.empty((n, n))
+    for i in range(n):
+        row, into = (M[order[i]] if i < u else M[i]), ordered[i]
+        for j in range(u):
+            into[j] = row[order[j]]
+        row, into = row[u:], into[u:]
+        for j in range(n - u):
+            into[j] = row[j]
+    R = np.ascontiguousarray(ordered[rank:, rank:])
+    if rank == 0:
+        return R
+    M_11, M_12 = np.ascontiguousarray(ordered[:rank, :rank]), np.ascontiguousarray(ordered[:rank, rank:])
+    half = np.dot(M_11, N)
+    for i in range(rank):
+        for j in range(rest):
+            Y[i, j] = M_12[i, j] - half[i, j]
+            M_12[i, j] -= 0.5 * half[i, j]
+    twice = np.dot(N.T, M_12)  # NᵀM₁₂ − ½ NᵀM₁₁N, which its transpose completes
+    for i in range(rest):
+        for j in range(rest):
+            R[i, j] -= twice[i, j] + twice[j, i]
     return R
 
 
@@ -126,51 +202,30 @@ def _minimized(R: np.ndarray, free: int, gains: np.ndarray) -> tuple:
 
     Writes into ``gains`` ``(free, ·)`` what these are, from the others.
     """
-    if free == 0:
-        return R, True
+    left = len(R) - free
     L = np.zeros((free, free))
     if not cholesky(R[:free, :free], L) > 0.0:
         return R, False
-    R_12 = np.ascontiguousarray(R[:free, free:])
-    V = R_12.copy()
-    cholesky_solve(L, V)
-    gains[:free, : V.shape[1]] = -V
-    return np.ascontiguousarray(R[free:, free:]) - np.dot(R_12.T, V), True
-
-
-@compiled
-def _conditions(C: np.ndarray, c: np.ndarray, H: np.ndarray, h: np.ndarray, step: np.ndarray, width: int) -> np.ndarray:
-    """Return what a stage's variables must satisfy, rows [·, 1] = 0, and beside each which row it is.
-
-    These are its own C y + c = 0 and, through the step to the next state, H x + h = 0.
-    """
-    own, after = len(C), len(H)
-    rows = np.zeros((own + after, width + own + after))
-    rows[:own, : width - 1] = C
-    rows[:own, width - 1] = c
-    if after > 0:
-        rows[own:, :width] = np.dot(H, step)
-        rows[own:, width - 1] += h
-    for i in range(own + after):
-        rows[i, width + i] = 1.0
-    return rows
-
-
-@compiled
-def _add_cost_to_go(R: np.ndarray, P: np.ndarray, step: np.ndarray, order: np.ndarray, N: np.ndarray) -> None:
-    """Add that of the next state, [P p], which the variables left reach by ``step`` with the first ones −N times these."""
-    x, rank, rest = len(P), len(N), len(R)
-    ordered = np.empty((x, rank + rest))
-    for i in range(x):
-        for j in range(rank + rest):
-            ordered[i, j] = step[i, order[j]]
-    reached = np.ascontiguousarray(ordered[:, rank:])
-    if rank > 0:
-        reached -= np.dot(np.ascontiguousarray(ordered[:, :rank]), N)
-    R += np.dot(reached.T, np.dot(np.ascontiguousarray(P[:, :x]), reached))
-    lead = np.dot(np.ascontiguousarray(P[:, x]), reached)
-    R[:, rest - 1] += lead
-    R[rest - 1, :] += lead
+    cost = np.ascontiguousarray(R[free:, free:])
+    if free > 0:
+        V = np.ascontiguousarray(R[:free, free:])
+        for i in range(free):
+            for j in range(i):
+                for a in range(left):
+                    V[i, a] -= L[i, j] * V[j, a]
+            for a in range(left):
+                V[i, a] /= L[i, i]
+        cost -= np.dot(V.T, V)
+        for i in range(free - 1, -1, -1):
+            for j in range(i + 1, free):
+                for a in range(left):
+                    V[i, a] -= L[j, i] * V[j, a]
+            for a in range(left):
+                V[i, a] /= L[i, i]
+        for i in range(free):
+            for a in range(left):
+                gains[i, a] = -V[i, a]
+    return cost, True
 
 
 @compiled
@@ -178,10 +233,12 @@ def _backward(
     nx: np.ndarray,
     nu: np.ndarray,
     nc: np.ndarray,
-    Q: np.ndarray,
-    q: np.ndarray,
+    n_links: np.ndarray,
+    all_links: np.ndarray,
     F: np.ndarray,
     f: np.ndarray,
+    Q: np.ndarray,
+    q: np.ndarray,
     C: np.ndarray,
     c: np.ndarray,
     factor: tuple,
@@ -189,65 +246,105 @@ def _backward(
     """Fill ``factor`` from the last stage to the first; return whether there is a minimum."""
     P, H, n_h, kept, T, ranks, orders, others, slopes, gains = factor
     K = len(nx)
+    to_go = np.zeros((1, 1))  # [x; 1] of the stage after
     for k in range(K - 1, -2, -1):
         # The first state is like controls of a stage before it, K as it were, that costs nothing by itself.
         at = k if k >= 0 else K
         x, u, own = (nx[k], nu[k], nc[k]) if k >= 0 else (0, nx[0], 0)
-        y, follows = x + u, 0 <= k + 1 < K
-        after = n_h[k + 1] if follows else 0
-        x_next = nx[k + 1] if follows else 0
-        step = np.zeros((x_next, y + 1))
-        if k < 0:
-            for i in range(u):
-                step[i, i] = 1.0
-        elif follows:
-            step[:, :y] = F[k, :x_next, :y]
-            step[:, y] = f[k, :x_next]
+        y, follows = x + u, k + 1 < K
+        after, x_next = (n_h[k + 1], nx[k + 1]) if follows else (0, 0)
+        links, steps = all_links[max(k, 0), : n_links[max(k, 0)]], F[max(k, 0)]
         m = own + after
-        ahead = H[k + 1, :after, : x_next + 1] if follows else np.zeros((0, 1))
-        rows = _conditions(
-            C[max(k, 0), :own, :y],
-            c[max(k, 0), :own],
-            np.ascontiguousarray(ahead[:, :x_next]),
-            ahead[:, x_next],
-            step,
-            y + 1,
-        )
-        order = np.arange(y + 1)
-        rank = _reduce(rows, u, order)
+
+        # What the variables must satisfy, U u + X [x; 1] = 0: own rows, and what is asked of the next state.
+        U, X, change = np.zeros((m, u)), np.zeros((m, x + 1)), np.eye(m)
+        for i in range(own):
+            for j in range(u):
+                U[i, j] = C[k, i, j]
+            for j in range(x):
+                X[i, j] = C[k, i, u + j]
+            X[i, x] = c[k, i]
+        for i in range(after):
+            X[own + i, x] = H[k + 1, i, x_next]
+            if k < 0:
+                for j in range(u):
+                    U[i, j] = H[0, i, j]
+                continue
+            for n in range(len(links)):
+                amount, j = H[k + 1, i, links[n, 0]] * steps[n], links[n, 1]
+                if j < u:
+                    U[own + i, j] += amount
+                else:
+                    X[own + i, j - u] += amount
+            for j in range(x_next):
+                X[own + i, x] += H[k + 1, i, j] * f[k, j]
+        order = np.arange(u)
+        rank = _reduce(U, change, order)
+        X = np.dot(change, X)
         ranks[at] = rank
-        orders[at, :u] = order[:u]
-        T[at, :m, :m] = rows[:, y + 1 :]
+        orders[at, :u] = order
         rest = y + 1 - rank
-        N = np.ascontiguousarray(rows[:rank, rank : y + 1])
-        others[at, :rank, :rest] = N
+        N = np.empty((rank, rest))
+        for i in range(m):
+            for j in range(m):
+                T[at, i, j] = change[i, j]
+        for i in range(rank):
+            row = U[i, rank:]
+            for j in range(u - rank):
+                N[i, j] = row[j]
+            row = N[i, u - rank :]
+            for j in range(x + 1):
+                row[j] = X[i, j]
+            for j in range(rest):
+                others[at, i, j] = N[i, j]
 
         M = np.zeros((y + 1, y + 1))
         if k >= 0:
             for i in range(y):
                 for j in range(y):
-                    M[i, j] = Q[k, order[i], order[j]]
-                M[i, y] = M[y, i] = q[k, order[i]]
-        R = _reduced(M, N, rank, slopes[at, :rank, :rest])
-        if follows:
-            _add_cost_to_go(R, P[k + 1, :x_next, : x_next + 1], step, order, N)
-        cost, bounded = _minimized(R, u - rank, gains[at])
+                    M[i, j] = Q[k, i, j]
+                M[i, y] = M[y, i] = q[k, i]
+            if follows:
+                _add_cost_to_go(M, to_go, links, steps, f[k])
+        else:
+            M[:] = to_go
+        R = _reduced(M, u, order, N, slopes[at, :rank, :rest])
+        to_go, bounded = _minimized(R, u - rank, gains[at])
         if not bounded:
             return False
         if k < 0:
             break
-        # Rounding would double an asymmetry at every stage.
-        P[k, :x, :x] = 0.5 * (cost[:x, :x] + cost[:x, :x].T)
-        P[k, :x, x] = cost[:x, x]
+        for i in range(x):
+            for j in range(i):  # rounding would double an asymmetry at every stage
+                to_go[i, j] = to_go[j, i] = 0.5 * (to_go[i, j] + to_go[j, i])
+        for i in range(x):
+            for j in range(x + 1):
+                P[k, i, j] = to_go[i, j]
         # Rows without controls: those that say something are asked of the state.
         count = 0
         for i in range(rank, m):
-            if np.max(np.abs(rows[i, u:y])) > _RANK:
-                H[k, count, : x + 1] = rows[i, u : y + 1]
+            largest = 0.0
+            for j in range(x):
+                largest = max(largest, abs(X[i, j]))
+            if largest > _RANK:
+                for j in range(x + 1):
+                    H[k, count, j] = X[i, j]
                 kept[k, count] = i
                 count += 1
         n_h[k] = count
     return True
+
+
+@reordered
+def _add_product(
+    A: np.ndarray, k: int, rows: int, columns: int, factor: float, v: np.ndarray, into: np.ndarray
+) -> None:
+    """Add the product of a block of ``A`` ``(K, ·, ·)`` with a vector, times ``factor``."""
+    for i in range(rows):
+        total = 0.0
+        for j in range(columns):
+            total += A[k, i, j] * v[j]
+        into[i] += factor * total
 
 
 @compiled
@@ -255,6 +352,8 @@ def _forward(
     nx: np.ndarray,
     nu: np.ndarray,
     nc: np.ndarray,
+    n_links: np.ndarray,
+    links: np.ndarray,
     F: np.ndarray,
     f: np.ndarray,
     y: np.ndarray,
@@ -269,39 +368,43 @@ def _forward(
     for k in range(-1, K):
         at = k if k >= 0 else K
         n_u, own = (nu[k], nc[k]) if k >= 0 else (nx[0], 0)
-        rank, follows = ranks[at], k + 1 < K
-        after = n_h[k + 1] if follows else 0
-        known = np.append(x, 1.0)
-        free = np.dot(np.ascontiguousarray(gains[at, : n_u - rank, : len(known)]), known)
-        left = np.concatenate((free, known))
+        n_x, rank = len(x), ranks[at]
+        after = n_h[k + 1] if k + 1 < K else 0
+        free, m, n_left = n_u - rank, own + after, n_u - rank + n_x + 1
+        left = np.zeros(n_left)  # the controls that rows leave free, the state and one
+        left[free : n_left - 1] = x
+        left[n_left - 1] = 1.0
+        _add_product(gains, at, free, n_x + 1, 1.0, left[free:], left)
+        eliminated = np.zeros(rank)
+        _add_product(others, at, rank, n_left, -1.0, left, eliminated)
         u = np.empty(n_u)
-        for i in range(rank):
-            u[orders[at, i]] = -np.dot(others[at, i, : len(left)], left)
-        for i in range(n_u - rank):
-            u[orders[at, rank + i]] = free[i]
-        gradient = np.zeros(0)
-        if k >= 0:
-            y[k, :n_u] = u
-            y[k, n_u : n_u + len(x)] = x
-        if follows:
-            n = nx[k + 1]
-            n_y = n_u + len(x)
-            x = np.dot(np.ascontiguousarray(F[k, :n, :n_y]), y[k, :n_y]) + f[k, :n] if k >= 0 else u
-            gradient = np.dot(np.ascontiguousarray(P[k + 1, :n, :n]), x) + P[k + 1, :n, n]
-        reduced = np.zeros(own + after)
-        for i in range(rank):
-            reduced[i] = -np.dot(slopes[at, i, : len(left)], left)
-            for j in range(len(gradient)):
-                reduced[i] -= gradient[j] * (F[k, j, orders[at, i]] if k >= 0 else 1.0 * (j == orders[at, i]))
+        for i in range(n_u):
+            u[orders[at, i]] = eliminated[i] if i < rank else left[i - rank]
+        reduced, of_rows = np.zeros(m), np.zeros(m)
+        _add_product(slopes, at, rank, n_left, -1.0, left, reduced)
         if k >= 0:
             for i in range(n_h[k]):
                 reduced[kept[k, i]] = pushes[i]
-        m = own + after
-        of_rows = np.dot(np.ascontiguousarray(T[at, :m, :m].T), reduced)
-        if k >= 0:
-            constraints[k, :own] = of_rows[:own]
+        for i in range(m):
+            for j in range(m):
+                of_rows[j] += T[at, i, j] * reduced[i]
         pushes = of_rows[own:]
-        if follows and k >= 0:
+        if k < 0:
+            x = u
+            continue
+        y[k, :n_u] = u
+        y[k, n_u : n_u + n_x] = x
+        constraints[k, :own] = of_rows[:own]
+        if k + 1 < K:
+            n = nx[k + 1]
+            x = np.ones(n + 1)
+            x[:n] = f[k, :n]
+            for i in range(n_links[k]):
+                x[links[k, i, 0]] += F[k, i] * y[k, links[k, i, 1]]
+            gradient = np.zeros(n)
+            _add_product(P, k + 1, n, n + 1, 1.0, x, gradient)
+            x = x[:n]
             for i in range(after):
-                gradient += pushes[i] * H[k + 1, i, : len(gradient)]
-            dynamics[k, : len(gradient)] = -gradient
+                for j in range(n):
+                    gradient[j] += pushes[i] * H[k + 1, i, j]
+            dynamics[k, :n] = -gradient

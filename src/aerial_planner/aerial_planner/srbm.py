@@ -36,7 +36,9 @@ from aerial_planner.symbolic import (
 from aerial_planner.trajectory import TakeOffTrajectory
 from aerial_planner.transcription import Solution
 
-_ITERATIONS_MAX = 35  # of one try: those that succeed take 10 to 30
+_ITERATIONS_MAX = 35  # of one try: those that succeed take 8 to 30
+_TOLERANCE = 0.1  # of its optimum, which is but a start: what follows takes as many iterations, this one two or three less
+_LEAST_PUSH = 0.5  # of the weight, in a guess
 _REACH_SAMPLES = 2000  # random poses from which the longest leg is read
 
 
@@ -52,7 +54,8 @@ class SingleRigidBody(Formulation):
         options: SolverOptions,
         library: FunctionLibrary | None = None,
     ) -> None:
-        options = dataclasses.replace(options, max_iterations=min(options.max_iterations, _ITERATIONS_MAX))
+        iterations = min(options.max_iterations, _ITERATIONS_MAX)
+        options = dataclasses.replace(options, max_iterations=iterations, tolerance=max(options.tolerance, _TOLERANCE))
         super().__init__(robot, model, settings, options, library)
         self.ik = ik
         home = robot.poses["home"]
@@ -75,8 +78,6 @@ class SingleRigidBody(Formulation):
     def reference_trajectory(self, schedule: Schedule, reference: Reference) -> TakeOffTrajectory:
         """Return the bare reference as a guess: what a kino-dynamic stage without warm start begins from."""
         N, M = len(schedule.contact), schedule.flight_knots
-        n_f = np.maximum(1, schedule.contact.sum(axis=1))[:, None, None]
-        share = np.array([0.0, 0.0, self.robot.mass * GRAVITY])
         pose = reference.joint_position[-1]
         return TakeOffTrajectory(
             dt=np.full(N, schedule.dt),
@@ -87,7 +88,7 @@ class SingleRigidBody(Formulation):
             joint_position=reference.joint_position,
             angular_velocity=np.zeros((N + 1, 3)),
             joint_velocity=np.zeros((N + 1, self.robot.n_joints)),
-            force=schedule.contact[..., None] * share / n_f,
+            force=self._pushes(schedule, reference),
             flight_time=schedule.flight_time,
             flight_orientation=reference.flight_orientation,
             flight_joint_position=reference.flight_path.at_knots(pose),
@@ -194,21 +195,18 @@ class SingleRigidBody(Formulation):
     def _stages(self, schedule: Schedule, reference: Reference) -> list[StageData]:
         settings = self.settings
         foot_ref = reference.foot_position.ravel()
-        weight = self.robot.mass * GRAVITY
+        push = self._pushes(schedule, reference)
         x = np.hstack([reference.com, reference.com_velocity, reference.angular_momentum, reference.orientation])
         stages = []
+        least = np.tile([-np.inf, -np.inf, settings.force_min], self.robot.n_contacts)
+        greatest = np.tile([np.inf, np.inf, settings.force_max], self.robot.n_contacts)
         for k, loaded in enumerate(schedule.contact):
-            n_f = int(loaded.sum())
+            n_f = 3 * int(loaded.sum())
             p = [[schedule.dt], reference.com[k], reference.com_velocity[k], reference.orientation[k]]
             p += [foot_ref, reference.x_0[:13]]
+            u = push[k][loaded].ravel()
             stages.append(
-                StageData.free(
-                    p=np.concatenate(p),
-                    x=x[k],
-                    u=np.tile([0.0, 0.0, weight / n_f], n_f),
-                    u_min=np.tile([-np.inf, -np.inf, settings.force_min], n_f),
-                    u_max=np.tile([np.inf, np.inf, settings.force_max], n_f),
-                )
+                StageData.free(p=np.concatenate(p), x=x[k], u=u, u_min=least[:n_f], u_max=greatest[:n_f])
             )
         share, T = np.array([1 / schedule.flight_knots]), np.array([schedule.flight_time])
         shortest, longest = (np.array([bound]) for bound in schedule.flight_time_range)
@@ -219,6 +217,13 @@ class SingleRigidBody(Formulation):
             p = schedule.landing_orientation if k == schedule.flight_knots else np.append(share, turned)
             stages.append(StageData.free(p=p, x=np.concatenate([reference.angular_momentum[-1], turned, T])))
         return stages
+
+    def _pushes(self, schedule: Schedule, reference: Reference) -> np.ndarray:
+        """Return forces ``(N, n_c, 3)`` [N] that lift the body as in the reference, evenly by all contacts that push."""
+        lifting = np.diff(reference.com_velocity[:, 2]) / schedule.dt + GRAVITY
+        force = np.zeros((*schedule.contact.shape, 3))
+        force[..., 2] = self.robot.mass * np.maximum(lifting, _LEAST_PUSH * GRAVITY)[:, None] * schedule.contact
+        return force / np.maximum(1, schedule.contact.sum(axis=1))[:, None, None]
 
     def _trajectory(self, schedule: Schedule, reference: Reference, solution: Solution) -> TakeOffTrajectory:
         N = len(schedule.contact)
@@ -294,5 +299,4 @@ def _legs(robot: Robot, model: BaseFrameModel) -> tuple[np.ndarray, np.ndarray]:
         attachment.append(robot.model.jointPlacements[joint].translation)
     attachment = np.array(attachment)
     poses = np.random.default_rng(0).uniform(*robot.planning_range, size=(_REACH_SAMPLES, robot.n_joints))
-    feet = np.asarray(model.feet.map(len(poses))(poses.T)).T.reshape(len(poses), robot.n_contacts, 3)
-    return attachment - com, np.max(np.linalg.norm(feet - attachment, axis=2), axis=0)
+    return attachment - com, np.max(np.linalg.norm(model.feet_at(poses) - attachment, axis=2), axis=0)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
+from aerial_planner.in_place import Interpreted, Pointwise
 from aerial_planner.symbolic import conjugate, quaternion_product
 
 _SAME_TURN = 0.5  # least q_goal · q of an attitude that is the goal's
@@ -48,22 +50,49 @@ class StageKind:
         """Return the kind's functions and derivatives; making them is what takes time in building a problem."""
         z, p = self.z, self.p
         lam_f = ca.SX.sym("lam_f")
-        lam_x = ca.SX.sym("lam_x", self.n_next)
-        lam_g = ca.SX.sym("lam_g", self.constraints.numel())
-        lagrangian = lam_f * self.cost - ca.dot(lam_x, self._dynamics) + ca.dot(lam_g, self.constraints)
-        H, gradient = ca.hessian(lagrangian, z)
-        expressions = {
-            "values": ([z, p], [self.cost, self._dynamics, ca.densify(self.constraints)]),
-            "gradient": ([z, p], [ca.densify(ca.gradient(self.cost, z))]),
-            "jacobian": ([z, p], [ca.jacobian(-self._dynamics, z), ca.jacobian(self.constraints, z)]),
-            "hessian": ([z, p, lam_f, lam_x, lam_g], [ca.densify(gradient), H]),
-        }
+        multipliers, lagrangian, H = self._lagrangian(lam_f)
         return StageFunctions(
-            **{
-                name: ca.Function(f"{self.name}_{name}", arguments, results, {"cse": True})
-                for name, (arguments, results) in expressions.items()
-            }
+            values=self._function("values", [z, p], self._values),
+            gradient=self._function("gradient", [z, p], [self._gradient]),
+            jacobian=self._function("jacobian", [z, p], self._jacobians),
+            hessian=self._function("hessian", [z, p, lam_f, *multipliers], [lagrangian, H]),
         )
+
+    def together(self) -> tuple[ca.Function, ca.Function]:
+        """Return what ``StageEvaluation`` evaluates: values, and derivatives all in one, which share what they can."""
+        z, p = self.z, self.p
+        multipliers, lagrangian, H = self._lagrangian(ca.SX(1.0))
+        derivatives = [self._gradient, *self._jacobians, lagrangian, H]
+        return (
+            self._function("values", [z, p], self._values),
+            self._function("derivatives", [z, p, *multipliers], derivatives),
+        )
+
+    def interpreted(self) -> StageEvaluation:
+        """Return the kind's functions as CasADi evaluates them."""
+        return StageEvaluation(*map(Interpreted, self.together()))
+
+    @property
+    def _values(self) -> list[ca.SX]:
+        return [self.cost, self._dynamics, ca.densify(self.constraints)]
+
+    @property
+    def _gradient(self) -> ca.SX:
+        return ca.densify(ca.gradient(self.cost, self.z))
+
+    @property
+    def _jacobians(self) -> list[ca.SX]:
+        return [ca.jacobian(-self._dynamics, self.z), ca.jacobian(self.constraints, self.z)]
+
+    def _lagrangian(self, lam_f: ca.SX) -> tuple[list[ca.SX], ca.SX, ca.SX]:
+        """Return the multipliers of dynamics and constraints, and gradient and Hessian of the Lagrangian."""
+        lam_x, lam_g = ca.SX.sym("lam_x", self.n_next), ca.SX.sym("lam_g", self.constraints.numel())
+        lagrangian = lam_f * self.cost - ca.dot(lam_x, self._dynamics) + ca.dot(lam_g, self.constraints)
+        H, gradient = ca.hessian(lagrangian, self.z)
+        return [lam_x, lam_g], ca.densify(gradient), H
+
+    def _function(self, name: str, arguments: list[ca.SX], results: list[ca.SX]) -> ca.Function:
+        return ca.Function(f"{self.name}_{name}", arguments, results, {"cse": True})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,6 +103,13 @@ class StageFunctions:
     gradient: ca.Function  # (z, p) ↦ gradient of the cost
     jacobian: ca.Function  # (z, p) ↦ Jacobians of −next state and of the constraints
     hessian: ca.Function  # (z, p, λ_f, λ_dynamics, λ_constraints) ↦ gradient and Hessian of the Lagrangian
+
+
+class StageEvaluation(NamedTuple):
+    """The functions of a stage kind, for many knots at once."""
+
+    values: Pointwise  # (z, p) ↦ cost, next state, constraints
+    derivatives: Pointwise  # (z, p, λ_dynamics, λ_constraints) ↦ those of ``StageFunctions``, in its order, with λ_f = 1
 
 
 class Rows:

@@ -1,20 +1,21 @@
 """The functions of a sequence of stage kinds, evaluated in shared memory, and the Newton steps they make.
 
-CasADi's functions read and write NumPy's memory without copies: those of a kind are mapped over consecutive knots, and what
-they return, the nonzeros of their sparse matrices, is spread into dense blocks by compiled code.
+Functions read and write NumPy's memory without copies: those of a kind are evaluated for consecutive knots at once, and
+what they return, the nonzeros of their sparse matrices, is spread into dense blocks by compiled code.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
 
 from aerial_model.compiled import compiled
-from aerial_planner.in_place import InPlace
 from aerial_planner.riccati import LinearQuadratic
-from aerial_planner.stage import StageFunctions, StageKind
+from aerial_planner.stage import StageEvaluation, StageKind
+
+_FEW = 8  # entries of a row, up to which its square is taken entry by entry
 
 
 class StageSequence:
@@ -22,7 +23,7 @@ class StageSequence:
 
     Args:
         kinds: of each knot.
-        functions_of: the functions of a kind.
+        evaluation_of: the functions of a kind.
 
     Attributes:
         p: parameters of all knots, to be written before ``evaluate``.
@@ -37,7 +38,7 @@ class StageSequence:
         lower: of the others; upper.
     """
 
-    def __init__(self, kinds: Sequence[StageKind], functions_of: Callable[[StageKind], StageFunctions]) -> None:
+    def __init__(self, kinds: Sequence[StageKind], evaluation_of: Callable[[StageKind], StageEvaluation]) -> None:
         self.kinds = list(kinds)
         self.nx = np.array([kind.x.numel() for kind in kinds])
         self.nu = np.array([kind.u.numel() for kind in kinds])
@@ -57,23 +58,33 @@ class StageSequence:
         self.costs = np.zeros(len(kinds))
         following = [self.z_0[k + 1] + np.arange(kind.n_next) for k, kind in enumerate(kinds)]
         self.next_x = np.concatenate(following).astype(np.int64)  # where in w each row of ``miss`` has its state
+        knots = np.arange(len(kinds))
+        of_rows = np.concatenate([np.repeat(knots, np.diff(self.step_0)), np.repeat(knots, np.diff(self.g_0))])
+        self._by_knot = np.argsort(of_rows, kind="stable")  # of misses and constraints
         starts = [k for k in range(len(kinds)) if k == 0 or kinds[k] is not kinds[k - 1]]
         ends = [*starts[1:], len(kinds)]
-        self._runs = [_Run(self, a, b, functions_of(kinds[a])) for a, b in zip(starts, ends, strict=True)]
+        evaluations = [evaluation_of(kinds[k]) for k in starts]
+        patterns = [_Pattern.of(kinds[k], evaluation) for k, evaluation in zip(starts, evaluations, strict=True)]
+        self._tables = _Tables.of(patterns, np.subtract(ends, starts), self.z_0, self.nx, self.nu)
+        self._F, self._G, self._H = (np.zeros(n[-1]) for n in (self._tables.F_0, self._tables.G_0, self._tables.H_0))
+        self.links = [patterns[run].F_at for run in self._tables.run]  # where each knot's step has nonzeros
+        self._values: list[Callable[[], object]] = []
+        self._derivatives: list[Callable[[], object]] = []
+        for start, end, evaluation in zip(starts, ends, evaluations, strict=True):
+            self._bind(start, end, evaluation)
 
     def evaluate(self, w: np.ndarray) -> float:
         """Fill ``miss`` and ``g`` at w and return the cost."""
         self.w[:] = w
-        for run in self._runs:
-            run.values.evaluate()
+        for evaluate in self._values:
+            evaluate()
         np.subtract(self.w[self.next_x], self.following, out=self.miss)
         return float(self.costs.sum())
 
     def differentiate(self) -> None:
         """Fill the gradients, and Jacobians and Hessians within, at the w evaluated last."""
-        for run in self._runs:
-            for derivative in run.derivatives:
-                derivative.evaluate()
+        for evaluate in self._derivatives:
+            evaluate()
         self.lagrangian[self.next_x] += self.lam_x
 
     def state(
@@ -89,7 +100,7 @@ class StageSequence:
         """Write a Newton step as a linear-quadratic problem.
 
         Args:
-            newton: to be written.
+            newton: to be written; of no other entries than these.
             q: gradient, as w, without the inequalities' share.
             diagonal: to be added to the Hessian's diagonal, as w.
             weights: of the squares of the inequalities' changes.
@@ -97,20 +108,10 @@ class StageSequence:
             c: by how much the dynamics, the equalities and the fixed variables are missed.
             fixed: which variables are fixed.
         """
-        newton.C[:] = 0.0
-        first = 0
-        for run in self._runs:
-            z = slice(self.z_0[run.start], self.z_0[run.start + run.n])
-            of_run = slice(first, first + run.n * run.n_unequal)
-            first = of_run.stop
-            shape = (run.n, -1)
-            _write(
-                *(run.start, int(self.nx[run.start]), int(self.nu[run.start])),
-                *(run.F, run.F_at, run.G, run.G_at, run.row, run.H, run.H_at),
-                *(q[z].reshape(shape), diagonal[z].reshape(shape)),
-                *(part[of_run].reshape(run.n, run.n_unequal) for part in (weights, pulls)),
-                *(newton.Q, newton.q, newton.F, newton.C),
-            )
+        _write(
+            *(self._tables, self._F, self._G, self._H, q, diagonal, weights, pulls),
+            *(newton.Q, newton.q, newton.F, newton.C),
+        )
         n_x, n_e = len(self.miss), int(self.e_0[-1])
         _scatter(c[:n_x], self.step_0, newton.f, -1.0)
         _scatter(c[n_x : n_x + n_e], self.e_0, newton.c, 1.0)
@@ -143,75 +144,129 @@ class StageSequence:
 
     def inequality_change(self, y: np.ndarray) -> np.ndarray:
         """Return the first-order change of the inequalities for steps y ``(K, ·)`` in (u, x) of each knot."""
-        change = []
-        for run in self._runs:
-            of_run = np.zeros((run.n, run.n_unequal))
-            _change(y[run.start : run.start + run.n], run.G, run.G_at, run.row, of_run)
-            change.append(of_run.ravel())
-        return np.concatenate(change)
+        change = np.zeros(len(self.lower))
+        _change(self._tables, y, self._G, change)
+        return change
 
     def constraints(self) -> np.ndarray:
         """Return misses of the dynamics and constraints, knot by knot."""
-        knots = range(len(self.kinds))
-        parts = [
-            part[start[k] : start[k + 1]]
-            for k in knots
-            for part, start in ((self.miss, self.step_0), (self.g, self.g_0))
-        ]
-        return np.concatenate(parts)
+        return np.concatenate([self.miss, self.g])[self._by_knot]
 
-
-class _Run:
-    """Consecutive knots of one kind: its functions mapped over them, and the nonzeros that these write."""
-
-    def __init__(self, sequence: StageSequence, start: int, end: int, functions: StageFunctions) -> None:
-        s, kind, n = sequence, sequence.kinds[start], end - start
-        self.start, self.n = start, n
+    def _bind(self, start: int, end: int, functions: StageEvaluation) -> None:
+        """Let the functions of a run of knots read and write this memory."""
 
         def part(row: np.ndarray, starts: np.ndarray) -> np.ndarray:
             return row[starts[start] : starts[end]]
 
-        z, p = part(s.w, s.z_0), part(s.p, s.p_0)
-        following, g = part(s.following, s.step_0), part(s.g, s.g_0)
-        gradient, lagrangian = part(s.gradient, s.z_0), part(s.lagrangian, s.z_0)
-        multipliers = [np.ones(n), part(s.lam_x, s.step_0), part(s.lam_g, s.g_0)]
-        of_F, of_G = (functions.jacobian.sparsity_out(i) for i in (0, 1))
-        of_H = functions.hessian.sparsity_out(1)
-        self.F, self.G, self.H = (np.zeros((n, sparsity.nnz())) for sparsity in (of_F, of_G, of_H))
-        self.F_at, self.G_at, self.H_at = (_entries(sparsity) for sparsity in (of_F, of_G, of_H))
+        n, t = end - start, self._tables
+        z, p = part(self.w, self.z_0), part(self.p, self.p_0)
+        values = [self.costs[start:end], part(self.following, self.step_0), part(self.g, self.g_0)]
+        self._values.append(functions.values.bind(n, [z, p], values))
+        multipliers = [part(self.lam_x, self.step_0), part(self.lam_g, self.g_0)]
+        F, G, H = (part(row, at) for row, at in ((self._F, t.F_0), (self._G, t.G_0), (self._H, t.H_0)))
+        gradient, lagrangian = part(self.gradient, self.z_0), part(self.lagrangian, self.z_0)
+        self._derivatives.append(functions.derivatives.bind(n, [z, p, *multipliers], [gradient, F, G, lagrangian, H]))
+
+
+class _Pattern(NamedTuple):
+    """Where the nonzeros of a kind's derivatives belong; variables in the order (u, x)."""
+
+    F_at: np.ndarray  # row and column of each (n_F, 2)
+    H_at: np.ndarray  # the same (n_H, 2)
+    n_G: int
+    n_unequal: int
+    # Of the constraints' Jacobian each entry's number in G, its row and its column (·, 3):
+    equal: np.ndarray  # of equalities, rows numbered among these
+    dense: np.ndarray  # of inequalities with many entries, rows numbered among these
+    sparse: np.ndarray  # of those with few, row by row, rows numbered among all inequalities
+    dense_rows: np.ndarray  # the numbers among all inequalities of those with many
+
+    @staticmethod
+    def of(kind: StageKind, functions: StageEvaluation) -> _Pattern:
+        """Return that of a kind."""
+        F_at, G_at, H_at = (functions.derivatives.nonzeros(i) for i in (1, 2, 4))
         n_x, n_u = kind.x.numel(), kind.u.numel()
-        place = np.concatenate([n_u + np.arange(n_x), np.arange(n_u)])  # of a variable in (u, x)
-        self.H_at[:] = place[self.H_at]
-        self.F_at[:, 1], self.G_at[:, 1] = place[self.F_at[:, 1]], place[self.G_at[:, 1]]
+        place = np.concatenate([n_u + np.arange(n_x), np.arange(n_u)]).astype(np.int64)
+        F_at[:, 1], G_at[:, 1] = place[F_at[:, 1]], place[G_at[:, 1]]
         equal = kind.lower == kind.upper
-        self.n_equal, self.n_unequal = int(equal.sum()), int((~equal).sum())
-        # Of each constraint its number among the equalities, or −1 less that among the inequalities.
-        self.row = np.where(equal, np.cumsum(equal) - 1, -np.cumsum(~equal)).astype(np.int64)
-        self.values = InPlace(functions.values, n, [z, p], [s.costs[start:end], following, g])
-        self.derivatives = (
-            InPlace(functions.gradient, n, [z, p], [gradient]),
-            InPlace(functions.jacobian, n, [z, p], [self.F, self.G]),
-            InPlace(functions.hessian, n, [z, p, *multipliers], [lagrangian, self.H]),
+        many = ~equal & (np.bincount(G_at[:, 0], minlength=len(equal)) > _FEW)
+        few = ~equal & ~many
+
+        def entries(rows: np.ndarray, among: np.ndarray) -> np.ndarray:
+            number = np.cumsum(among) - 1
+            chosen = np.flatnonzero(rows[G_at[:, 0]])
+            table = np.column_stack([chosen, number[G_at[chosen, 0]], G_at[chosen, 1]])
+            return table[np.argsort(table[:, 1], kind="stable")].astype(np.int64)
+
+        return _Pattern(
+            F_at=F_at,
+            H_at=place[H_at],
+            n_G=len(G_at),
+            n_unequal=int((~equal).sum()),
+            equal=entries(equal, equal),
+            dense=entries(many, many),
+            sparse=entries(few, ~equal),
+            dense_rows=np.flatnonzero(many[~equal]),
         )
 
 
-def _entries(sparsity: ca.Sparsity) -> np.ndarray:
-    """Return row and column of each nonzero ``(nnz, 2)``."""
-    return np.column_stack([sparsity.row(), sparsity.get_col()]).astype(np.int64).reshape(-1, 2)
+class _Tables(NamedTuple):
+    """The patterns of all runs of knots, one after the other, and where each knot's and each run's numbers start."""
+
+    nx: np.ndarray  # (K,)
+    nu: np.ndarray  # (K,)
+    run: np.ndarray  # which one a knot belongs to (K,)
+    z_0: np.ndarray  # (K+1,) in w
+    F_0: np.ndarray
+    G_0: np.ndarray
+    H_0: np.ndarray
+    unequal_0: np.ndarray  # among the inequalities
+    H_at: np.ndarray
+    equal: np.ndarray
+    dense: np.ndarray
+    sparse: np.ndarray
+    dense_rows: np.ndarray
+    H_at_0: np.ndarray  # (R+1,)
+    equal_0: np.ndarray
+    dense_0: np.ndarray
+    sparse_0: np.ndarray
+    dense_rows_0: np.ndarray
+
+    @staticmethod
+    def of(
+        patterns: Sequence[_Pattern], lengths: np.ndarray, z_0: np.ndarray, nx: np.ndarray, nu: np.ndarray
+    ) -> _Tables:
+        """Return those of runs with these patterns, ``lengths`` knots each."""
+        run = np.repeat(np.arange(len(patterns)), lengths)
+
+        def starts(sizes: Sequence[int]) -> np.ndarray:
+            return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+
+        def of_knots(sizes: Sequence[int]) -> np.ndarray:
+            return starts(np.array(sizes)[run])
+
+        names = ("H_at", "equal", "dense", "sparse", "dense_rows")
+        tables = {name: [getattr(pattern, name) for pattern in patterns] for name in names}
+        return _Tables(
+            nx=nx,
+            nu=nu,
+            run=run,
+            z_0=z_0,
+            F_0=of_knots([len(pattern.F_at) for pattern in patterns]),
+            G_0=of_knots([pattern.n_G for pattern in patterns]),
+            H_0=of_knots([len(pattern.H_at) for pattern in patterns]),
+            unequal_0=of_knots([pattern.n_unequal for pattern in patterns]),
+            **{name: np.concatenate(parts) for name, parts in tables.items()},
+            **{f"{name}_0": starts([len(part) for part in parts]) for name, parts in tables.items()},
+        )
 
 
 @compiled
 def _write(
-    start: int,
-    nx: int,
-    nu: int,
+    tables: _Tables,
     F: np.ndarray,
-    F_at: np.ndarray,
     G: np.ndarray,
-    G_at: np.ndarray,
-    row: np.ndarray,
     H: np.ndarray,
-    H_at: np.ndarray,
     gradient: np.ndarray,
     diagonal: np.ndarray,
     weights: np.ndarray,
@@ -221,41 +276,65 @@ def _write(
     F_all: np.ndarray,
     C_all: np.ndarray,
 ) -> None:
-    """Write the knots of one run into a linear-quadratic problem's arrays, in the order (u, x)."""
-    n, ny, n_unequal = len(F), nx + nu, weights.shape[1]
-    D = np.empty((n_unequal, ny))
-    for i in range(n):
-        k = start + i
-        q = q_all[k]
-        for j in range(ny):
-            q[j] = gradient[i, nx + j] if j < nu else gradient[i, j - nu]
-        F_k = F_all[k]
-        F_k[:, :ny] = 0.0
-        for e in range(len(F_at)):
-            F_k[F_at[e, 0], F_at[e, 1]] = -F[i, e]
-        D[:] = 0.0
-        for e in range(len(G_at)):
-            r, c = row[G_at[e, 0]], G_at[e, 1]
-            if r >= 0:
-                C_all[k, r, c] = G[i, e]
-            else:
-                q[c] += pulls[i, -1 - r] * G[i, e]
-                D[-1 - r, c] = np.sqrt(weights[i, -1 - r]) * G[i, e]
-        Q = np.dot(D.T, D)
+    """Write all knots into a linear-quadratic problem's arrays, in the order (u, x)."""
+    t = tables
+    D = np.zeros((0, 1))
+    for k in range(len(t.run)):
+        r, nx, nu = t.run[k], t.nx[k], t.nu[k]
+        ny, z_0 = nx + nu, t.z_0[k]
+        F_k, G_k, H_k = F[t.F_0[k] : t.F_0[k + 1]], G[t.G_0[k] : t.G_0[k + 1]], H[t.H_0[k] : t.H_0[k + 1]]
+        weight, pull = weights[t.unequal_0[k] :], pulls[t.unequal_0[k] :]
+        for e in range(len(F_k)):
+            F_all[k, e] = -F_k[e]
+        for e in range(t.equal_0[r], t.equal_0[r + 1]):
+            C_all[k, t.equal[e, 1], t.equal[e, 2]] = G_k[t.equal[e, 0]]
+        rows = t.dense_rows[t.dense_rows_0[r] : t.dense_rows_0[r + 1]]
+        if k == 0 or t.run[k - 1] != r:
+            D = np.zeros((len(rows), ny + 1))
+        root = np.sqrt(weight[rows])
+        for i in range(len(rows)):
+            D[i, ny] = pull[rows[i]] / root[i] if root[i] > 0.0 else 0.0
+        dense = t.dense[t.dense_0[r] : t.dense_0[r + 1]]
+        for e in range(len(dense)):
+            D[dense[e, 1], dense[e, 2]] = root[dense[e, 1]] * G_k[dense[e, 0]]
+        Q = np.dot(D.T, D)  # [Q q; qᵀ ·] of the inequalities with many entries
+        sparse = t.sparse[t.sparse_0[r] : t.sparse_0[r + 1]]
+        first = 0
+        while first < len(sparse):
+            row, end = sparse[first, 1], first
+            while end < len(sparse) and sparse[end, 1] == row:
+                end += 1
+            for a in range(first, end):
+                value, j = G_k[sparse[a, 0]], sparse[a, 2]
+                Q[ny, j] += pull[row] * value
+                for b in range(first, end):
+                    Q[j, sparse[b, 2]] += weight[row] * value * G_k[sparse[b, 0]]
+            first = end
+        H_at = t.H_at[t.H_at_0[r] : t.H_at_0[r + 1]]
         for e in range(len(H_at)):
-            Q[H_at[e, 0], H_at[e, 1]] += H[i, e]
-        for j in range(ny):
-            Q[j, j] += diagonal[i, nx + j] if j < nu else diagonal[i, j - nu]
-        Q_all[k, :ny, :ny] = Q
+            Q[H_at[e, 0], H_at[e, 1]] += H_k[e]
+        for j in range(nx):
+            Q[nu + j, nu + j] += diagonal[z_0 + j]
+            q_all[k, nu + j] = gradient[z_0 + j] + Q[ny, nu + j]
+        for j in range(nu):
+            Q[j, j] += diagonal[z_0 + nx + j]
+            q_all[k, j] = gradient[z_0 + nx + j] + Q[ny, j]
+        for a in range(ny):
+            for b in range(ny):
+                Q_all[k, a, b] = Q[a, b]
 
 
 @compiled
-def _change(y: np.ndarray, G: np.ndarray, G_at: np.ndarray, row: np.ndarray, change: np.ndarray) -> None:
-    for i in range(len(G)):
-        for e in range(len(G_at)):
-            r = row[G_at[e, 0]]
-            if r < 0:
-                change[i, -1 - r] += G[i, e] * y[i, G_at[e, 1]]
+def _change(tables: _Tables, y: np.ndarray, G: np.ndarray, change: np.ndarray) -> None:
+    """Add G y of all inequalities."""
+    t = tables
+    for k in range(len(t.run)):
+        r, first, G_k = t.run[k], t.unequal_0[k], G[t.G_0[k] :]
+        for e in range(t.sparse_0[r], t.sparse_0[r + 1]):
+            change[first + t.sparse[e, 1]] += G_k[t.sparse[e, 0]] * y[k, t.sparse[e, 2]]
+        for e in range(t.dense_0[r], t.dense_0[r + 1]):
+            row = t.dense_rows[t.dense_rows_0[r] + t.dense[e, 1]]
+            change[first + row] += G_k[t.dense[e, 0]] * y[k, t.dense[e, 2]]
 
 
 @compiled

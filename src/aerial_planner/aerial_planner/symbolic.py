@@ -11,13 +11,16 @@ hold it against.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
 import pinocchio as pin
 
 from aerial_model.robot import Robot
+from aerial_planner.in_place import Batch, Pointwise, interpreted
 
 _ROUNDING = 1e-12  # entries of constant placements below this are rounding, and cost operations
 
@@ -32,10 +35,50 @@ class BaseFrameModel:
     foot_jacobians: ca.Function  # q_j ↦ stacked ∂foot_i/∂q_j (3 n_c, n), sparse
     angular_momentum: ca.Function  # q_j, ω (3,) in B, q̇_j (n,) ↦ α_B (3,) about the centre of mass [kg·m²/s]
     inertia: ca.Function  # q_j ↦ locked rotational inertia about the centre of mass (3, 3) [kg·m²]
+    compiled: Callable[[ca.Function], Pointwise | None] = interpreted  # how numbers are had
+
+    def coms(self, q_j: np.ndarray) -> np.ndarray:
+        """Return the centre of mass ``(K, 3)`` [m] with the joints at ``(K, n)`` [rad]."""
+        return self._com(q_j)[0]
+
+    def feet_at(self, q_j: np.ndarray) -> np.ndarray:
+        """Return the contact points ``(K, n_c, 3)`` [m] with the joints at ``(K, n)`` [rad]."""
+        return self._feet(q_j)[0].reshape(len(q_j), -1, 3)
+
+    def momenta(self, q_j: np.ndarray, dq_j: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the inertia ``(K, 3, 3)`` [kg·m²] and the joints' angular momentum ``(K, 3)`` [kg·m²/s]; see ``inertia``."""
+        inertia, momentum = self._momenta(q_j, dq_j)
+        return inertia.reshape(-1, 3, 3), momentum  # symmetric
+
+    @cached_property
+    def _com(self) -> Batch:
+        return Batch(self.com, self.compiled)
+
+    @cached_property
+    def _feet(self) -> Batch:
+        return Batch(self.feet, self.compiled)
+
+    @cached_property
+    def _momenta(self) -> Batch:
+        q_j, _, dq_j = self.angular_momentum.sx_in()
+        still = self.angular_momentum(q_j, ca.SX.zeros(3), dq_j)
+        return Batch(ca.Function("momenta", [q_j, dq_j], [self.inertia(q_j), still]), self.compiled)
+
+    @property
+    def batches(self) -> tuple[Batch, ...]:
+        """What numbers are had from."""
+        return self._com, self._feet, self._momenta
 
 
-def base_frame_model(robot: Robot) -> BaseFrameModel:
-    """Return the CasADi functions of a robot."""
+def base_frame_model(
+    robot: Robot, compiled: Callable[[ca.Function], Pointwise | None] = interpreted
+) -> BaseFrameModel:
+    """Return the CasADi functions of a robot.
+
+    Args:
+        robot: the robot.
+        compiled: returns a function's machine code, None if there is none.
+    """
     model = robot.model
     q = ca.SX.sym("q_j", robot.n_joints)
     dq = ca.SX.sym("dq_j", robot.n_joints)
@@ -91,6 +134,7 @@ def base_frame_model(robot: Robot) -> BaseFrameModel:
         foot_jacobians=ca.Function("foot_jacobians", [q], [jacobians], names, ["J"]),
         angular_momentum=ca.Function("alpha", [q, omega, dq], [alpha], ["q_j", "omega", "dq_j"], ["alpha_B"]),
         inertia=ca.Function("inertia", [q], [inertia_at_com], names, ["I"]),
+        compiled=compiled,
     )
 
 

@@ -22,7 +22,7 @@ from aerial_planner.compiled import FunctionLibrary
 from aerial_planner.interior_point import InteriorPoint
 from aerial_planner.nlp import FlatProgram
 from aerial_planner.solver import SolverName, SolverOptions
-from aerial_planner.stage import StageData, StageFunctions, StageKind
+from aerial_planner.stage import StageData, StageEvaluation, StageKind
 
 _ACTIVE = 1e-3  # an inequality nearer to its bound than this holds the optimum back
 _DEFAULTS = SolverOptions()
@@ -48,7 +48,7 @@ class Problem:
     Args:
         kinds: of each knot.
         options: of the solver.
-        library: compiled stage functions; None: interpreted ones.
+        library: compiled stage functions, for our own solver; None: interpreted ones.
 
     Raises:
         ValueError: if a kind does not lead to the states of the next one.
@@ -72,8 +72,10 @@ class Problem:
         self._lower = np.concatenate([part for zero, low, _ in rows for part in (zero, low)])
         self._upper = np.concatenate([part for zero, _, up in rows for part in (zero, up)])
         self._labels = [label for kind in kinds for label in ("dynamics",) * kind.n_next + kind.labels]
-        method = InteriorPoint if SolverName(options.solver) is SolverName.RICCATI else FlatProgram
-        self._solver = method(self.kinds, self._functions_of, options)
+        if SolverName(options.solver) is SolverName.RICCATI:
+            self._solver = InteriorPoint(self.kinds, self._evaluation_of, options)
+        else:
+            self._solver = FlatProgram(self.kinds, options)
 
     def solve(self, stages: Sequence[StageData]) -> Solution:
         """Return the optimum from the stages' guess; check ``converged`` and ``max_violation`` before using it."""
@@ -82,7 +84,7 @@ class Problem:
         g = self._solver.constraints(outcome.w, p)
         finite = bool(np.all(np.isfinite(outcome.w)))
         at_bound = (self._lower < self._upper) & (np.minimum(g - self._lower, self._upper - g) < _ACTIVE)
-        active = Counter(label for label, hit in zip(self._labels, at_bound, strict=True) if hit)
+        active = Counter(self._labels[row] for row in np.flatnonzero(at_bound))
         sizes = [n for s in stages for n in (len(s.x), len(s.u))]
         parts = np.split(outcome.w, np.cumsum(sizes)[:-1])
         return Solution(
@@ -101,9 +103,9 @@ class Problem:
         w, p, lower, upper = _flat(stages)
         return self._excess(w, lower, upper, self._solver.constraints(w, p))
 
-    def _functions_of(self, kind: StageKind) -> StageFunctions:
+    def _evaluation_of(self, kind: StageKind) -> StageEvaluation:
         compiled = self._library.load(kind) if self._library else None
-        return compiled or kind.functions()
+        return compiled or kind.interpreted()
 
     def _excess(self, w: np.ndarray, lower: np.ndarray, upper: np.ndarray, g: np.ndarray) -> float:
         """Return the largest violation of bounds on the variables ``w`` and on the constraints ``g``."""

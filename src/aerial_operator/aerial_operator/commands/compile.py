@@ -30,5 +30,5 @@ def run(args: argparse.Namespace) -> Report:
     seconds, folder = time.perf_counter() - began, str(default_cache())
     figures = {"robot": robot.name, "compiled": compiled, "seconds": seconds, "folder": folder}
     return Report(
-        success=True, figures=figures, text=f"{compiled} stage kinds compiled in {seconds:.0f} s, in {folder}"
+        success=True, figures=figures, text=f"{compiled} libraries compiled in {seconds:.0f} s, in {folder}"
     )
