@@ -141,14 +141,14 @@ class Robot:
     def mass_matrices(self, q_j: np.ndarray) -> np.ndarray:
         """Return mass matrices H ``(K, nv, nv)``, rotor inertia included, with the joints at ``q_j`` ``(K, n)`` [rad]."""
         data = self.model.createData()
-        upper = np.zeros((len(q_j), self.model.nv, self.model.nv))
+        M = np.zeros((len(q_j), self.model.nv, self.model.nv))  # at first what is right of the diagonal
         q = np.concatenate([np.zeros(3), IDENTITY, np.zeros(self.n_joints)])  # it does not depend on the base
         for k, positions in enumerate(q_j):
             q[JOINT_POSITION] = positions
-            upper[k] = np.triu(pin.crba(self.model, data, q))
+            M[k] = pin.crba(self.model, data, q)
         below = np.tril_indices(self.model.nv, -1)
-        upper[:, below[0], below[1]] = upper[:, below[1], below[0]]
-        return upper
+        M[:, below[0], below[1]] = M[:, below[1], below[0]]
+        return M
 
     @property
     def contact_links(self) -> np.ndarray:

@@ -148,8 +148,8 @@ class FunctionLibrary:
 
 
 def _expressions(kind: StageKind) -> ca.Function:
-    outputs = [kind.cost, kind.constraints, *([] if kind.next_state is None else [kind.next_state])]
-    return ca.Function(kind.name, [kind.x, kind.u, kind.p], outputs)
+    outputs = [kind.cost, kind.constraints, kind.y_is, *([] if kind.next_state is None else [kind.next_state])]
+    return ca.Function(kind.name, [kind.x, kind.u, kind.p, kind.y], outputs)
 
 
 @cache

@@ -155,7 +155,7 @@ class KinoDynamicKinds(Formulation):
 
         name = f"take_off_{contact_bits(touching)}_{contact_bits(loaded)}_{self._name}"
         name += "_last" if last else "_end" if ends_phase else ""
-        kind = rows.stage(name, s.x, s.u, s.p, cost, s.step(robot.mass))
+        kind = rows.stage(name, s.x, s.u, s.p, cost, s.step(robot.mass), **s.shorthands)
         self._kinds[key] = kind
         return kind
 

@@ -106,6 +106,7 @@ class TakeOffKnot:
         self.omega, self.dq_j = ca.SX.sym("omega", 3), ca.SX.sym("dq_j", n)
         self.force = {int(i): ca.SX.sym(f"f_{i}", 3) for i in np.flatnonzero(loaded)}
         self.f = ca.vertcat(*self.force.values())
+        self.quaternion_mid, self.q_j_mid = ca.SX.sym("quat_mid", 4), ca.SX.sym("q_j_mid", n)  # see ``shorthands``
         self.dq_before = ca.SX.sym("dq_before", n)
         self.motion = ca.vertcat(self.r, self.rdot, self.alpha, self.quaternion, self.q_j, self.dq_before)
         self.stretch = ca.SX.sym("stretch", int(timed))
@@ -172,14 +173,18 @@ class TakeOffKnot:
         return sum((ca.cross(self.foot_ref[:, i] - middle, f) for i, f in self.force.items()), ca.SX.zeros(3))
 
     @property
-    def R_mid(self) -> ca.SX:  # noqa: N802
-        """Attitude at mid-interval, where a step's mean rates are the rates."""
-        return rotation_matrix(quaternion_product(self.quaternion, quaternion_step(self.omega, 0.5 * self.dt)))
+    def shorthands(self) -> dict[str, ca.SX]:
+        """Attitude and joint angles at mid-interval, of which most is a function, as symbols and what they are."""
+        quaternion_mid = quaternion_product(self.quaternion, quaternion_step(self.omega, 0.5 * self.dt))
+        return {
+            "y": ca.vertcat(self.quaternion_mid, self.q_j_mid),
+            "y_is": ca.vertcat(quaternion_mid, self.q_j + 0.5 * self.dt * self.dq_j),
+        }
 
     @property
-    def q_j_mid(self) -> ca.SX:
-        """Joint angles at mid-interval ``(n,)`` [rad]."""
-        return self.q_j + 0.5 * self.dt * self.dq_j
+    def R_mid(self) -> ca.SX:  # noqa: N802
+        """Attitude at mid-interval, where a step's mean rates are the rates."""
+        return rotation_matrix(self.quaternion_mid)
 
     def momentum_gap(self, model: BaseFrameModel) -> ca.SX:
         """Return Rᵀα − α_B at mid-interval (3.8)."""

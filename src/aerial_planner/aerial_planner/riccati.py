@@ -143,12 +143,14 @@ def _reduce(U: np.ndarray, T: np.ndarray, order: np.ndarray) -> int:
 
 
 @compiled
-def _add_cost_to_go(M: np.ndarray, P: np.ndarray, links: np.ndarray, F: np.ndarray, f: np.ndarray) -> None:
-    """Add that of the next state, ½ [x; 1]ᵀ P [x; 1] with x = F y + f, to ½ [y; 1]ᵀ M [y; 1]."""
+def _add_cost_to_go(
+    M: np.ndarray, P: np.ndarray, links: np.ndarray, F: np.ndarray, f: np.ndarray, place: np.ndarray
+) -> None:
+    """Add that of the next state, ½ [x; 1]ᵀ P [x; 1] with x = F y + f, to ½ [y; 1]ᵀ M [y; 1], y in the order ``place``."""
     x, y = len(P) - 1, len(M) - 1
     W = np.zeros((y + 1, x))  # of the slope by x, from [y; 1]
     for n in range(len(links)):
-        i, j = links[n, 0], links[n, 1]
+        i, j = links[n, 0], place[links[n, 1]]
         for a in range(x):
             W[j, a] += F[n] * P[i, a]
     for i in range(x + 1):
@@ -157,58 +159,64 @@ def _add_cost_to_go(M: np.ndarray, P: np.ndarray, links: np.ndarray, F: np.ndarr
             W[y, a] += factor * P[i, a]
     across = np.ascontiguousarray(W.T)
     for n in range(len(links)):
-        i, j = links[n, 0], links[n, 1]
+        i, j = links[n, 0], place[links[n, 1]]
         for a in range(y + 1):
             M[j, a] += F[n] * across[i, a]
-    for j in range(y):
-        M[y, j] = M[j, y]
 
 
 @compiled
-def _reduced(M: np.ndarray, u: int, order: np.ndarray, N: np.ndarray, Y: np.ndarray) -> np.ndarray:
-    """Return ½ [y; 1]ᵀ M [y; 1] as a matrix of all but the first ``rank`` in ``order``, which are −N times the others.
+def _eliminate(M: np.ndarray, N: np.ndarray, Y: np.ndarray) -> None:
+    """Let the first variables of ½ [y; 1]ᵀ M [y; 1] be −N times the others: what is left is M's last block, above its diagonal.
 
-    Writes into Y ``(rank, ·)`` what the slope by the first ones is, from the others. ``order`` is of the ``u`` controls.
+    Writes into Y what the slope by the first ones is, from the others.
     """
-    rank, n = len(N), len(M)
-    rest, free = n - rank, u - rank
-    ordered = np.empty((n, n))
-    for i in range(n):
-        row, into = (M[order[i]] if i < u else M[i]), ordered[i]
-        for j in range(u):
-            into[j] = row[order[j]]
-        row, into = row[u:], into[u:]
-        for j in range(n - u):
-            into[j] = row[j]
-    R = np.ascontiguousarray(ordered[rank:, rank:])
+    rank, rest = N.shape
     if rank == 0:
-        return R
-    M_11, M_12 = np.ascontiguousarray(ordered[:rank, :rank]), np.ascontiguousarray(ordered[:rank, rank:])
-    half = np.dot(M_11, N)
+        return
+    first, Z = np.empty((rank, rank)), np.empty((rank, rest))
+    for i in range(rank):
+        for j in range(rank):
+            first[i, j] = M[min(i, j), max(i, j)]
+        row = M[i, rank:]
+        for j in range(rest):
+            Z[i, j] = row[j]
+    half = np.dot(first, N)
     for i in range(rank):
         for j in range(rest):
-            Y[i, j] = M_12[i, j] - half[i, j]
-            M_12[i, j] -= 0.5 * half[i, j]
-    twice = np.dot(N.T, M_12)  # NᵀM₁₂ − ½ NᵀM₁₁N, which its transpose completes
+            Y[i, j] = Z[i, j] - half[i, j]
+            Z[i, j] -= 0.5 * half[i, j]
+    twice = np.dot(N.T, Z)  # NᵀM₁₂ − ½ NᵀM₁₁N, which its transpose completes
     for i in range(rest):
-        for j in range(rest):
-            R[i, j] -= twice[i, j] + twice[j, i]
-    return R
+        row, ahead = M[rank + i, rank + i :], twice[i, i:]
+        for j in range(rest - i):
+            row[j] -= ahead[j] + twice[i + j, i]
 
 
 @compiled
-def _minimized(R: np.ndarray, free: int, gains: np.ndarray) -> tuple:
-    """Return ½ [v; 1]ᵀ R [v; 1] minimized over the first ``free`` variables, and whether it has a minimum.
+def _minimized(M: np.ndarray, rank: int, free: int, gains: np.ndarray) -> tuple:
+    """Return M's last block minimized over its first ``free`` variables, and whether it has a minimum.
 
     Writes into ``gains`` ``(free, ·)`` what these are, from the others.
     """
-    left = len(R) - free
-    L = np.zeros((free, free))
-    if not cholesky(R[:free, :free], L) > 0.0:
-        return R, False
-    cost = np.ascontiguousarray(R[free:, free:])
+    first = rank + free
+    left = len(M) - first
+    A, L = np.empty((free, free)), np.zeros((free, free))
+    for i in range(free):
+        for j in range(i + 1):
+            A[i, j] = M[rank + j, rank + i]
+    cost = np.empty((left, left))
+    if not cholesky(A, L) > 0.0:
+        return cost, False
+    for i in range(left):
+        row = M[first + i, first:]
+        for j in range(left):
+            cost[i, j] = row[j]
     if free > 0:
-        V = np.ascontiguousarray(R[:free, free:])
+        V = np.empty((free, left))
+        for i in range(free):
+            row = M[rank + i, first:]
+            for j in range(left):
+                V[i, j] = row[j]
         for i in range(free):
             for j in range(i):
                 for a in range(left):
@@ -225,6 +233,9 @@ def _minimized(R: np.ndarray, free: int, gains: np.ndarray) -> tuple:
         for i in range(free):
             for a in range(left):
                 gains[i, a] = -V[i, a]
+    for i in range(left):
+        for j in range(i):
+            cost[i, j] = cost[j, i]
     return cost, True
 
 
@@ -298,25 +309,31 @@ def _backward(
             for j in range(rest):
                 others[at, i, j] = N[i, j]
 
+        # ½ [y; 1]ᵀ M [y; 1]: the cost from here on, controls in their new order.
+        place = np.arange(y + 1)
+        for i in range(u):
+            place[order[i]] = i
         M = np.zeros((y + 1, y + 1))
-        if k >= 0:
-            for i in range(y):
-                for j in range(y):
-                    M[i, j] = Q[k, i, j]
-                M[i, y] = M[y, i] = q[k, i]
-            if follows:
-                _add_cost_to_go(M, to_go, links, steps, f[k])
-        else:
-            M[:] = to_go
-        R = _reduced(M, u, order, N, slopes[at, :rank, :rest])
-        to_go, bounded = _minimized(R, u - rank, gains[at])
+        for i in range(y if k >= 0 else 0):
+            into, row = M[place[i]], Q[k, i]
+            for j in range(u):
+                into[place[j]] = row[j]
+            into, row = into[u:], row[u:]
+            for j in range(x):
+                into[j] = row[j]
+            into[x] = q[k, i]
+        if k >= 0 and follows:
+            _add_cost_to_go(M, to_go, links, steps, f[k], place)
+        elif follows:
+            for i in range(u + 1):
+                for j in range(u + 1):
+                    M[place[i], place[j]] = to_go[i, j]
+        _eliminate(M, N, slopes[at, :rank, :rest])
+        to_go, bounded = _minimized(M, rank, u - rank, gains[at])
         if not bounded:
             return False
         if k < 0:
             break
-        for i in range(x):
-            for j in range(i):  # rounding would double an asymmetry at every stage
-                to_go[i, j] = to_go[j, i] = 0.5 * (to_go[i, j] + to_go[j, i])
         for i in range(x):
             for j in range(x + 1):
                 P[k, i, j] = to_go[i, j]

@@ -8,7 +8,7 @@ with weaker legs for its weight flies lower. A robot's folder may have ``motions
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -130,6 +130,7 @@ class Schedule:
         return float(self.rotation[2])
 
 
+@cache
 def motions_folder() -> Path:
     """Return the folder whose YAML files are the motions that any robot has."""
     return Path(str(resources.files("aerial_planner"))) / "motions"
@@ -137,8 +138,12 @@ def motions_folder() -> Path:
 
 def known_motions(robot: Robot) -> dict[str, Path]:
     """Return the motions a robot has: name → file."""
-    folders = [motions_folder(), *(folder / "motions" for folder in reversed(robot.folders))]
-    return {path.stem: path for folder in folders for path in sorted(folder.glob("*.yaml"))}
+    return {path.stem: path for folder in _folders(robot) for path in sorted(folder.glob("*.yaml"))}
+
+
+def _folders(robot: Robot) -> list[Path]:
+    """Return where a robot's motions are; of two of a name the later counts."""
+    return [motions_folder(), *(folder / "motions" for folder in reversed(robot.folders))]
 
 
 def load_motion(name: str, robot: Robot) -> Motion:
@@ -147,16 +152,19 @@ def load_motion(name: str, robot: Robot) -> Motion:
     Raises:
         RefusalError: if there is none of that name, with the names that exist.
     """
-    known = known_motions(robot)
-    if name not in known:
+    files = [folder / f"{name}.yaml" for folder in reversed(_folders(robot))]
+    file = next((file for file in files if file.is_file() and file.stem == name), None)
+    if file is None:
+        known = known_motions(robot)
         raise RefusalError(
             RefusalCode.UNKNOWN_MOTION, f"unknown motion '{name}'{closest(name, known)}; known: {', '.join(known)}"
         )
-    if known[name].parent != motions_folder():
-        return _read_motion(known[name], known[name].stat().st_mtime_ns, Scale(), 1.0)
+    changed = file.stat().st_mtime_ns
+    if file.parent != motions_folder():
+        return _read_motion(file, changed, Scale(), 1.0)
     # What is left of the legs' force when the weight is borne is what the robot rises by.
     spring = float(np.clip((robot.strength - 1) / (_REFERENCE_STRENGTH - 1), _LEAST_SPRING, 1.0))
-    return _read_motion(known[name], known[name].stat().st_mtime_ns, robot.scale, spring)
+    return _read_motion(file, changed, robot.scale, spring)
 
 
 @lru_cache

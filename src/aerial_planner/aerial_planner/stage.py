@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cache
 from typing import NamedTuple
 
 import casadi as ca
@@ -18,7 +19,8 @@ _SAME_TURN = 0.5  # least q_goal · q of an attitude that is the goal's
 class StageKind:
     """The expressions of one kind of knot; ``next_state`` is None at the last one.
 
-    Constraint bounds that are numbers of the problem rather than of the request are given here.
+    Constraint bounds that are numbers of the problem rather than of the request are given here. Cost and constraints may
+    say ``y`` for ``y_is``: derivatives are then made by the chain rule through few variables, which keeps them short.
     """
 
     name: str
@@ -31,6 +33,8 @@ class StageKind:
     lower: np.ndarray  # (n_g,); equal to upper: an equality
     upper: np.ndarray  # (n_g,)
     labels: tuple[str, ...]  # what each constraint is, for people
+    y: ca.SX = field(default_factory=lambda: ca.SX(0, 1))  # (n_y,)
+    y_is: ca.SX = field(default_factory=lambda: ca.SX(0, 1))  # (n_y,) of x, u and p
 
     @property
     def n_next(self) -> int:
@@ -78,20 +82,36 @@ class StageKind:
 
     @property
     def _gradient(self) -> ca.SX:
-        return ca.densify(ca.gradient(self.cost, self.z))
+        return ca.densify(self._through_y(ca.jacobian(self.cost, self._zy)).T)
 
     @property
     def _jacobians(self) -> list[ca.SX]:
-        return [ca.jacobian(-self._dynamics, self.z), ca.jacobian(self.constraints, self.z)]
+        return [ca.jacobian(-self._dynamics, self.z), self._through_y(ca.jacobian(self.constraints, self._zy))]
 
     def _lagrangian(self, lam_f: ca.SX) -> tuple[list[ca.SX], ca.SX, ca.SX]:
         """Return the multipliers of dynamics and constraints, and gradient and Hessian of the Lagrangian."""
         lam_x, lam_g = ca.SX.sym("lam_x", self.n_next), ca.SX.sym("lam_g", self.constraints.numel())
         lagrangian = lam_f * self.cost - ca.dot(lam_x, self._dynamics) + ca.dot(lam_g, self.constraints)
-        H, gradient = ca.hessian(lagrangian, self.z)
-        return [lam_x, lam_g], ca.densify(gradient), H
+        H, gradient = ca.hessian(lagrangian, self._zy)
+        H = self._through_y(self._through_y(H).T)
+        if self.y.numel() > 0:
+            slope = ca.SX.sym("slope", self.y.numel())
+            bend, _ = ca.hessian(ca.dot(slope, self.y_is), self.z)
+            H += ca.substitute(bend, slope, gradient[self.z.numel() :])
+        return [lam_x, lam_g], ca.densify(self._through_y(gradient.T).T), H
+
+    @property
+    def _zy(self) -> ca.SX:
+        return ca.vertcat(self.z, self.y)
+
+    def _through_y(self, J: ca.SX) -> ca.SX:
+        """Return derivatives by z ``(·, n_z)`` from those by z and y ``(·, n_z + n_y)``."""
+        n = self.z.numel()
+        return J[:, :n] + ca.mtimes(J[:, n:], ca.jacobian(self.y_is, self.z)) if self.y.numel() > 0 else J
 
     def _function(self, name: str, arguments: list[ca.SX], results: list[ca.SX]) -> ca.Function:
+        if self.y.numel() > 0:
+            results = ca.substitute(results, [self.y], [self.y_is])
         return ca.Function(f"{self.name}_{name}", arguments, results, {"cse": True})
 
 
@@ -138,9 +158,12 @@ class Rows:
         self.equal("landing attitude", error[:3])
         self.between("landing attitude", error[3], _SAME_TURN, np.inf)
 
-    def stage(self, name: str, x: ca.SX, u: ca.SX, p: ca.SX, cost: ca.SX, next_state: ca.SX | None) -> StageKind:
-        """Return the stage kind with these rows as its constraints."""
+    def stage(
+        self, name: str, x: ca.SX, u: ca.SX, p: ca.SX, cost: ca.SX, next_state: ca.SX | None, **shorthands: ca.SX
+    ) -> StageKind:
+        """Return the stage kind with these rows as its constraints; ``shorthands`` are y and y_is, if there are any."""
         return StageKind(
+            **shorthands,
             name=name,
             x=x,
             u=u,
@@ -183,8 +206,16 @@ class StageData:
             p=p,
             x=x,
             u=u,
-            x_min=np.full(len(x), -np.inf) if x_min is None else x_min,
-            x_max=np.full(len(x), np.inf) if x_max is None else x_max,
-            u_min=np.full(len(u), -np.inf) if u_min is None else u_min,
-            u_max=np.full(len(u), np.inf) if u_max is None else u_max,
+            x_min=_infinite(len(x), -1) if x_min is None else x_min,
+            x_max=_infinite(len(x), 1) if x_max is None else x_max,
+            u_min=_infinite(len(u), -1) if u_min is None else u_min,
+            u_max=_infinite(len(u), 1) if u_max is None else u_max,
         )
+
+
+@cache
+def _infinite(n: int, sign: int) -> np.ndarray:
+    """Return n bounds that are none, to be read only."""
+    bounds = np.full(n, sign * np.inf)
+    bounds.flags.writeable = False
+    return bounds

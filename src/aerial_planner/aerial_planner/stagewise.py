@@ -332,9 +332,13 @@ def _change(tables: _Tables, y: np.ndarray, G: np.ndarray, change: np.ndarray) -
         r, first, G_k = t.run[k], t.unequal_0[k], G[t.G_0[k] :]
         for e in range(t.sparse_0[r], t.sparse_0[r + 1]):
             change[first + t.sparse[e, 1]] += G_k[t.sparse[e, 0]] * y[k, t.sparse[e, 2]]
-        for e in range(t.dense_0[r], t.dense_0[r + 1]):
-            row = t.dense_rows[t.dense_rows_0[r] + t.dense[e, 1]]
-            change[first + row] += G_k[t.dense[e, 0]] * y[k, t.dense[e, 2]]
+        e, end = t.dense_0[r], t.dense_0[r + 1]
+        while e < end:
+            row, total = t.dense[e, 1], 0.0
+            while e < end and t.dense[e, 1] == row:
+                total += G_k[t.dense[e, 0]] * y[k, t.dense[e, 2]]
+                e += 1
+            change[first + t.dense_rows[t.dense_rows_0[r] + row]] = total
 
 
 @compiled

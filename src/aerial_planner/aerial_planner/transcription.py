@@ -68,6 +68,8 @@ class Problem:
         self.kinds = list(kinds)
         self.options = options
         self._library = library
+        ends = np.cumsum([n for kind in kinds for n in (kind.x.numel(), kind.u.numel())]).tolist()
+        self._parts = [slice(*pair) for pair in pairwise([0, *ends])]  # of w: x_0, u_0, x_1, …
         rows = [(np.zeros(kind.n_next), kind.lower, kind.upper) for kind in kinds]
         self._lower = np.concatenate([part for zero, low, _ in rows for part in (zero, low)])
         self._upper = np.concatenate([part for zero, _, up in rows for part in (zero, up)])
@@ -85,8 +87,7 @@ class Problem:
         finite = bool(np.all(np.isfinite(outcome.w)))
         at_bound = (self._lower < self._upper) & (np.minimum(g - self._lower, self._upper - g) < _ACTIVE)
         active = Counter(self._labels[row] for row in np.flatnonzero(at_bound))
-        sizes = [n for s in stages for n in (len(s.x), len(s.u))]
-        parts = np.split(outcome.w, np.cumsum(sizes)[:-1])
+        parts = [outcome.w[part] for part in self._parts]
         return Solution(
             x=parts[::2],
             u=parts[1::2],
