@@ -155,6 +155,16 @@ def test_arms_that_shift_the_centre_of_mass_leave_the_feet_where_they_are_to_lan
     assert shifted.landing_com[0] == pytest.approx(usual.landing_com[0], abs=1e-9)
 
 
+@pytest.mark.parametrize("displacement", [*GOALS, (0.0, 1.2, 0.0), (-0.9, 1.0, 0.0)], ids=str)
+def test_the_feet_centre_lands_at_the_goal_even_where_legs_do_not_reach_as_far_ahead_as_they_should(a_robot, displacement):
+    robot, model = a_robot
+    schedule, reference = jump(robot, model, displacement)
+    pose = reference.landing_joint_position[None]
+    feet = (model.feet_at(pose) - model.coms(pose)[:, None])[0].mean(axis=0)
+    radius = np.mean([point.radius for point in robot.contact_points])
+    np.testing.assert_allclose(reference.landing_com + feet, schedule.landing_centre + [0.0, 0.0, radius], atol=1e-9)
+
+
 def test_the_path_at_its_knots_is_what_the_problem_has(a_robot):
     robot, model = a_robot
     _, reference = jump(robot, model, GOALS[1])

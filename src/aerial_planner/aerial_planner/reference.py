@@ -139,7 +139,7 @@ def body_reference(
     share = 1 - ready / schedule.flight_knots  # of the flight, in which the feet are drawn up
     ahead = lead + schedule.arms_shift * [1.0, 1.0, 0.0]  # of the centre of mass with the arms at home
     landing = _landing(landing_feet + ahead @ R_landing, height, fall, T, share, robot, model, ik)
-    landing_com = landing_com - lead - [0.0, 0.0, landing.drop - schedule.arms_shift[2]]
+    landing_com = landing_com - lead - [0.0, 0.0, landing.drop - schedule.arms_shift[2]] - R_landing @ landing.miss
 
     stretched = ik.solve(((feet - com_0 - [0.0, 0.0, _STRETCHED_RISE * height]) @ R)[None], q_j)[0]
     N = len(schedule.contact)
@@ -240,6 +240,7 @@ class _Landing(NamedTuple):
     reach: np.ndarray  # joint positions from which the feet are drawn up to meet it softly (n,) [rad]
     pose: np.ndarray  # joint positions at touchdown (n,) [rad]
     drop: float  # of the centre of mass at touchdown below its height in the landing pose [m]
+    miss: np.ndarray  # of the feet's centre in this pose, from where it was to be (3,) in B [m]
 
 
 def _landing(
@@ -268,7 +269,8 @@ def _landing(
     rates = ((fall + depths / flight_time) * _rigid_share(robot, poses, per_metre))[:, None] * per_metre
     reaches = poses - 0.5 * share * flight_time * rates
     relative = model.feet_at(poses) - model.coms(poses)[:, None]
-    missing = np.linalg.norm(relative - targets, axis=2).max(axis=1)
+    misses = relative - targets  # (K, n_c, 3): legs do not reach as far as one might wish
+    missing = np.linalg.norm(misses, axis=2).max(axis=1)
     low, high = robot.planning_range
     haste = np.max(np.abs(rates) / (_FOLDING_SPEED * robot.actuators.no_load_speed), axis=1)
     supple = np.all((low <= reaches) & (reaches <= high), axis=1) & (haste <= 1.0)
@@ -277,7 +279,7 @@ def _landing(
         best = int(np.argmax(reached & supple))
     else:
         best = int(np.argmin(np.where(reached, haste, np.inf)) if reached.any() else np.argmin(missing))
-    return _Landing(np.clip(reaches[best], low, high), poses[best], float(depths[best]))
+    return _Landing(np.clip(reaches[best], low, high), poses[best], float(depths[best]), misses[best].mean(axis=0))
 
 
 def _rigid_share(robot: Robot, poses: np.ndarray, rates: np.ndarray) -> np.ndarray:

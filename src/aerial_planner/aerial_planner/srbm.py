@@ -38,7 +38,6 @@ from aerial_planner.transcription import Solution
 
 _ITERATIONS_MAX = 35  # of one try: those that succeed take 8 to 30
 _TOLERANCE = 0.1  # of its optimum, which is but a start: what follows takes as many iterations, this one two or three less
-_LEAST_PUSH = 0.5  # of the weight, in a guess
 _REACH_SAMPLES = 2000  # random poses from which the longest leg is read
 
 
@@ -88,7 +87,7 @@ class SingleRigidBody(Formulation):
             joint_position=reference.joint_position,
             angular_velocity=np.zeros((N + 1, 3)),
             joint_velocity=np.zeros((N + 1, self.robot.n_joints)),
-            force=self._pushes(schedule, reference),
+            force=self._pushes(schedule),
             flight_time=schedule.flight_time,
             flight_orientation=reference.flight_orientation,
             flight_joint_position=reference.flight_path.at_knots(pose),
@@ -195,7 +194,7 @@ class SingleRigidBody(Formulation):
     def _stages(self, schedule: Schedule, reference: Reference) -> list[StageData]:
         settings = self.settings
         foot_ref = reference.foot_position.ravel()
-        push = self._pushes(schedule, reference)
+        push = self._pushes(schedule)
         x = np.hstack([reference.com, reference.com_velocity, reference.angular_momentum, reference.orientation])
         stages = []
         least = np.tile([-np.inf, -np.inf, settings.force_min], self.robot.n_contacts)
@@ -218,11 +217,13 @@ class SingleRigidBody(Formulation):
             stages.append(StageData.free(p=p, x=np.concatenate([reference.angular_momentum[-1], turned, T])))
         return stages
 
-    def _pushes(self, schedule: Schedule, reference: Reference) -> np.ndarray:
-        """Return forces ``(N, n_c, 3)`` [N] that lift the body as in the reference, evenly by all contacts that push."""
-        lifting = np.diff(reference.com_velocity[:, 2]) / schedule.dt + GRAVITY
+    def _pushes(self, schedule: Schedule) -> np.ndarray:
+        """Return forces ``(N, n_c, 3)`` [N] that bear the weight, evenly by all contacts that push.
+
+        Those that lift the body as in the reference are a guess that saves jumps an iteration, and loses flips to the side.
+        """
         force = np.zeros((*schedule.contact.shape, 3))
-        force[..., 2] = self.robot.mass * np.maximum(lifting, _LEAST_PUSH * GRAVITY)[:, None] * schedule.contact
+        force[..., 2] = self.robot.mass * GRAVITY * schedule.contact
         return force / np.maximum(1, schedule.contact.sum(axis=1))[:, None, None]
 
     def _trajectory(self, schedule: Schedule, reference: Reference, solution: Solution) -> TakeOffTrajectory:
