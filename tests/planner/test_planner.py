@@ -256,6 +256,24 @@ def test_held_joints_stay_at_home_and_are_not_asked_for_more_than_they_can_hold(
     assert use.torque_ratio[:, robot.joint_names.index(f"l_{weak}")].max() > 0.5  # it is what binds
 
 
+@pytest.mark.parametrize("binding", [(), ("friction",)])
+def test_a_single_rigid_body_that_goes_astray_refuses_a_goal_only_if_something_binds_it(planner, monkeypatch, binding):
+    """Some spins have it tumble, however near the goal."""
+    body = type(planner._srbm)
+    solve = body.solve
+
+    def astray(self, *request):
+        guess, solution = solve(self, *request)
+        return guess, dataclasses.replace(solution, converged=False, binding=binding)
+
+    monkeypatch.setattr(body, "solve", astray)
+    if binding:
+        with pytest.raises(RefusalError, match="what binds: friction"):
+            planner.plan(jump(0.4, 0.0))
+    else:
+        assert planner.plan(jump(0.4, 0.0)).report.started_from == "reference"
+
+
 @pytest.mark.parametrize("variant", ["KD", "AAKD", "AAKD*"])
 @pytest.mark.parametrize("warm_start", [True, False])
 def test_every_variant_finds_the_same_easy_jump(planner, forward, variant, warm_start):

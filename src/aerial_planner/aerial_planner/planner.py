@@ -327,13 +327,16 @@ class Planner:
             if solution.max_violation <= VIOLATION_TOLERANCE:
                 return take_off, solution
         guess = self._guess(request, schedule, reference, progress, clock)
-        clock.started_from = "srbm" if request.warm_start else "reference"
         return self._optimize(stage, schedule, reference, guess, progress, clock)
 
     def _guess(
         self, request: MotionRequest, schedule: Schedule, reference: Reference, progress: Progress, clock: _Clock
     ) -> TakeOffTrajectory:
-        """Return where the kino-dynamic stage starts: the single-rigid-body optimum, or the bare reference."""
+        """Return where the kino-dynamic stage starts: the single-rigid-body optimum, or the bare reference.
+
+        The latter, too, where a single rigid body went astray though nothing binds it, as some that spin do.
+        """
+        clock.started_from = "reference"
         if not request.warm_start:
             return self._srbm.reference_trajectory(schedule, reference)
         began = time.perf_counter()
@@ -341,13 +344,16 @@ class Planner:
         clock.srbm += time.perf_counter() - began
         clock.iterations += solution.iterations
         progress("srbm", clock.iterations, solution.max_violation)
+        if not solution.converged and not solution.binding:
+            return self._srbm.reference_trajectory(schedule, reference)
         if not solution.converged:
             raise RefusalError(
                 RefusalCode.OUT_OF_REACH,
                 f"out of reach: even a single rigid body with the robot's legs cannot leave the ground so as to land at "
                 f"{_position(request)} after {schedule.flight_time:.2f} s of flight; "
-                f"what binds: {', '.join(solution.binding[:3]) or 'nothing in particular'}",
+                f"what binds: {', '.join(solution.binding[:3])}",
             )
+        clock.started_from = "srbm"
         return guess
 
     def _optimize(
