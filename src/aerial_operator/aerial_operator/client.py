@@ -67,7 +67,7 @@ class Client(Node):
         self._check = check
         self._next_check = 0.0
         self._selections = self.create_publisher(MotionSelection, "motion_selection", qos.EVENT)
-        self.create_subscription(MotionResult, "motion_result", self._on_result, qos.EVENT)
+        self.create_subscription(MotionResult, "motion_result", self._on_result, qos.ANSWER)
         self.create_subscription(ControllerStatus, "controller_status", self._on_status, qos.TELEMETRY)
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, qos.EVENT)
         self.status: ControllerStatus | None = None  # the controller's last

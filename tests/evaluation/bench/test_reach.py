@@ -42,6 +42,8 @@ def test_what_binds_is_said_just_beyond_the_reach():
 
 
 def test_the_map_is_drawn(tmp_path):
-    flat = [{"direction_deg": a, "distance_m": 1.0, "height_m": 0.0, "binds": ""} for a in (0.0, 120.0, 240.0)]
-    draw([*flat, {"direction_deg": 0.0, "distance_m": 0.8, "height_m": 0.3, "binds": ""}], tmp_path / "reach.png")
+    row = {"direction_deg": 0.0, "on_platform": False, "distance_m": 1.0, "height_m": 0.0, "binds": ""}
+    flat = [row | {"direction_deg": angle} for angle in (0.0, 120.0, 240.0)]
+    raised = [row | {"on_platform": True, "distance_m": 0.8, "height_m": height} for height in (0.0, 0.3)]
+    draw([*flat, *raised], tmp_path / "reach.png")
     assert (tmp_path / "reach.png").read_bytes().startswith(b"\x89PNG")

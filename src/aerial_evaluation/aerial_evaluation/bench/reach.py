@@ -32,18 +32,26 @@ def reach(subject: Subject) -> list[Row]:
         subject.progress(f"reach: {np.rad2deg(angle):.0f}°")
         direction = np.array([np.cos(angle), np.sin(angle), 0.0])
         distance, binds = farthest(subject.planner, _along(direction), _BOUND * size)
-        rows.append(
-            {"direction_deg": float(np.rad2deg(angle)), "distance_m": distance, "height_m": 0.0, "binds": binds}
-        )
+        rows.append(_row(float(np.rad2deg(angle)), distance, 0.0, binds, on_platform=False))
     for heights in PLATFORM_DISTANCES:
         distance = heights * size
         subject.progress(f"reach: a platform, {distance:.2f} m ahead")
         height, binds = farthest(subject.planner, _onto(subject, distance), _HEIGHT_BOUND * size)
-        rows.append({"direction_deg": 0.0, "distance_m": distance, "height_m": height, "binds": binds})
+        rows.append(_row(0.0, distance, height, binds, on_platform=True))
     file = subject.folder / "reach.png"
     reach_figure.draw(rows, file)
     subject.progress(f"reach: the map is {file}")
     return rows
+
+
+def _row(direction: float, distance: float, height: float, binds: str, *, on_platform: bool) -> Row:
+    return {
+        "direction_deg": direction,
+        "on_platform": on_platform,
+        "distance_m": distance,
+        "height_m": height,
+        "binds": binds,
+    }
 
 
 def farthest(planner: Planner, request: Callable[[float], MotionRequest], bound: float) -> tuple[float, str]:

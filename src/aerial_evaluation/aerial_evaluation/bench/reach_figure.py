@@ -17,8 +17,8 @@ _RESOLUTION = 200  # [1/in]
 
 def draw(rows: Sequence[Mapping[str, Any]], file: Path) -> None:
     """Draw the rows of ``bench.reach.reach`` into a PNG file."""
-    flat = [row for row in rows if row["height_m"] == 0.0]
-    raised = [row for row in rows if row["height_m"] != 0.0]
+    flat = [row for row in rows if not row["on_platform"]]
+    raised = [row for row in rows if row["on_platform"]]
     figure = Figure(figsize=(8.0, 3.8), layout="constrained")
     around = figure.add_subplot(1, 2, 1, projection="polar")
     around.set_theta_zero_location("N")

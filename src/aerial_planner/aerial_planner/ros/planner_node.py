@@ -76,7 +76,7 @@ class PlannerNode(node.AerialNode):
         self._joints: JointState | None = None
         self._counts = {"planned": 0, "refused": 0}
         self._plans = self.create_lifecycle_publisher(MotionPlan, "motion_plan", qos.EVENT)
-        self._results = self.create_lifecycle_publisher(MotionResult, "motion_result", qos.EVENT)
+        self._results = self.create_lifecycle_publisher(MotionResult, "motion_result", qos.ANSWER)
         self._unanswered: MotionPlan | None = None  # the last plan, until a controller says what becomes of it
         self._repeat_until = 0.0  # monotonic [s]
         self._repeater = self.create_timer(REPEAT_PERIOD, self._repeat)

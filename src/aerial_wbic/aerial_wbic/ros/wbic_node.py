@@ -58,7 +58,7 @@ class WbicNode(node.AerialNode):
         self._commands = publisher(JointCommand, "joint_command", control)
         self._statuses = publisher(ControllerStatus, "controller_status", qos.TELEMETRY)
         self._odometry = publisher(Odometry, "odometry", qos.TELEMETRY)
-        self._results = publisher(MotionResult, "motion_result", qos.EVENT)
+        self._results = publisher(MotionResult, "motion_result", qos.ANSWER)
         self._outputs = [self._commands, self._statuses, self._odometry, self._results]
         self._inputs = [
             subscription(RobotState, "state", self._on_state, control, raw=True),
