@@ -16,7 +16,7 @@ import numpy as np
 from distributed import Client, LocalCluster, as_completed
 from scipy.stats import binomtest
 
-from aerial_evaluation import consistency
+from aerial_evaluation import consistency, tracking
 from aerial_evaluation.closed_loop import run
 from aerial_model.config import closest
 from aerial_model.errors import AerialError, ConfigurationError, RefusalError
@@ -81,7 +81,8 @@ class Campaign:
     def attempt(self, trial: Trial) -> dict[str, Any]:
         """Return what came of a trial.
 
-        That is: seed, conditions, whether it landed, the reason if not, figures, samples of the estimate's errors.
+        That is: seed, conditions, whether it landed, the reason if not, figures, samples of the estimate's errors
+        and of the plan's.
         """
         result = {"seed": trial.seed, "conditions": asdict(trial.conditions), "landed": False}
         try:
@@ -104,6 +105,7 @@ class Campaign:
             "reason": ", ".join(outcome.landing.failed),
             **{name: landing[name] for name in FIGURES},
             "estimate": outcome.estimate,
+            "tracking": outcome.tracking,
             "plan_time_s": outcome.planning.report.total_time_s,
             "real_time_factor": outcome.real_time_factor,
         }
@@ -200,6 +202,7 @@ def summary(done: Sequence[Mapping[str, Any]], variations: Sequence[Variation] =
         "conditions": groups,
         "figures": _figures(done),
         "estimate": consistency.summary([result["estimate"] for result in done if "estimate" in result]),
+        "tracking": tracking.summary([result["tracking"] for result in done if "tracking" in result]),
     }
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from aerial_evaluation import consistency
+from aerial_evaluation import consistency, tracking
 from aerial_evaluation.landing import OBSERVE_TIME, Landing, Tick, judge
 from aerial_model.plan import Plan
 from aerial_model.request import MotionRequest
@@ -36,6 +36,7 @@ class Outcome:
     terrain: Terrain  # in W
     ticks: list[Tick] = field(repr=False)  # from the first, standing included
     estimate: dict[str, dict[str, list[float]]] = field(repr=False)  # samples of its errors, see ``consistency``
+    tracking: dict[str, dict[str, list[float]]] = field(repr=False)  # samples, see ``tracking``
     start_time: float  # when the controller accepted the plan [s]
     tick_time: np.ndarray  # (ticks,) wall time of the controller's steps [s]
     real_time_factor: float  # simulated over wall time, simulator and controller together
@@ -55,6 +56,7 @@ class Outcome:
             "real_time_factor": self.real_time_factor,
             "cpu_factor": self.cpu_factor,
             "estimate": consistency.summary([self.estimate]),
+            "tracking": tracking.summary([self.tracking]),
             "plan": self.planning.report.to_json(),
             "motion": self.planning.plan.motion,
             "robot": self.planning.plan.robot,
@@ -146,20 +148,14 @@ def run(
     start_time = simulation.time
     loop.controller.accept(planning.plan)
     _execute(loop, planning.plan, conditions, seed)
+    course = {"origin": origin, "heading": heading, "start_time": start_time, "ticks": loop.ticks}
     return Outcome(
-        landing=judge(
-            robot,
-            planning.plan,
-            origin=origin,
-            heading=heading,
-            start_time=start_time,
-            ticks=loop.ticks,
-            ground_rise=conditions.ground_rise,
-        ),
+        landing=judge(robot, planning.plan, **course, ground_rise=conditions.ground_rise),
         planning=planning,
         terrain=simulation.terrain,
         ticks=loop.ticks,
         estimate=loop.estimate(),
+        tracking=tracking.sampled(robot, planning.plan, **course),
         start_time=start_time,
         tick_time=np.array(loop.tick_times),
         real_time_factor=simulation.time / loop.wall_time,

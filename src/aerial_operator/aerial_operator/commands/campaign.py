@@ -13,6 +13,7 @@ from typing import Any
 from aerial_evaluation.campaign import FIGURES, Campaign, results, summary, trials, workers
 from aerial_evaluation.campaign_figure import draw
 from aerial_evaluation.consistency import ERRORS, NORMALIZED
+from aerial_evaluation.tracking import FIGURES as TRACKED
 from aerial_model.robot import Robot
 from aerial_operator.console import ProgressBar, Report, UsageError, pairs, say, table, to_json
 from aerial_operator.goal import add_goal_arguments, request_from
@@ -128,6 +129,8 @@ def _text(figures: Mapping[str, Any]) -> str:
             for name, spread in figures["figures"].items()
         ]
         parts.append(table(["of those that landed", "median", "95 %", "largest"], rows))
+    if figures["tracking"]:
+        parts.append(_tracking(figures["tracking"]))
     if figures["estimate"]:
         parts.append(_estimate(figures["estimate"]))
     if figures["failures"]:
@@ -139,6 +142,15 @@ def _text(figures: Mapping[str, Any]) -> str:
             + (f"\n  … and {rest} more" if rest else "")
         )
     return "\n\n".join(parts)
+
+
+def _tracking(phases: Mapping[str, Any]) -> str:
+    header = ["off the plan in", *(f"{name} (95 %)" for name in TRACKED)]
+    rows = [
+        [phase, *(f"{row[name]['rms']:.3g} ({row[name]['p95']:.3g})" for name in TRACKED)]
+        for phase, row in phases.items()
+    ]
+    return table(header, rows)
 
 
 def _estimate(phases: Mapping[str, Any]) -> str:
