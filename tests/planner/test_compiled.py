@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from aerial_planner import vector_code
 from aerial_planner.compiled import CompilationError, FunctionLibrary
 from aerial_planner.interior_point import InteriorPoint
 from aerial_planner.planner import Planner
@@ -38,8 +39,10 @@ def evaluated(function, n, arguments, sizes):
     return results
 
 
+@pytest.mark.parametrize("block", [300, 7])  # operations: all in one, or values handed from one to the next
 @pytest.mark.parametrize("n", [1, 4, 6])  # points: some lanes left over, none, both
-def test_compiled_functions_give_the_interpreted_numbers_to_the_last_bit(library, kind, n):
+def test_compiled_functions_give_the_interpreted_numbers_to_the_last_bit(library, kind, n, block, monkeypatch):
+    monkeypatch.setattr(vector_code, "_BLOCK", block)
     assert library.load(kind) is None
     assert library.compile(kind)
     rng = np.random.default_rng(0)
@@ -56,15 +59,35 @@ def test_compiled_functions_give_the_interpreted_numbers_to_the_last_bit(library
 def test_rows_of_another_size_are_refused(library, kind):
     library.compile(kind)
     for evaluation in (library.load(kind), kind.interpreted()):
-        with pytest.raises(ValueError, match="expected rows of"):
-            evaluation.values.bind(2, [np.zeros(6), np.zeros(2)], [np.zeros(2), np.zeros(4), np.zeros(3)])
+        given, wanted = [np.zeros(6), np.zeros(2)], [np.zeros(2), np.zeros(4), np.zeros(2)]
+        evaluation.values.bind(2, given, wanted)
+        for arguments, results in (
+            (given, [*wanted[:2], np.zeros(3)]),
+            (given[:1], wanted),
+            ([np.zeros(3), given[1]], wanted),
+        ):
+            with pytest.raises(ValueError, match="expected rows of"):
+                evaluation.values.bind(2, arguments, results)
 
 
 def test_every_operation_there_is_c_for_is_computed_as_casadi_does(library):
     x = ca.SX.sym("x", 2)
     a, b = ca.vertsplit(x)
     unary = [ca.sqrt, ca.sin, ca.cos, ca.tan, ca.asin, ca.acos, ca.atan, ca.tanh, ca.exp, ca.log, ca.fabs, lambda v: -v]
-    binary = [a + b, a - b, a * b, a / b, a**b, ca.atan2(a, b), ca.fmin(a, b), ca.fmax(a, b), a**2, 2 * a, 1 / a, a**1.7]
+    binary = [
+        a + b,
+        a - b,
+        a * b,
+        a / b,
+        a**b,
+        ca.atan2(a, b),
+        ca.fmin(a, b),
+        ca.fmax(a, b),
+        a**2,
+        2 * a,
+        1 / a,
+        a**1.7,
+    ]
     f = ca.Function("operations", [x], [ca.vertcat(*(u(a) for u in unary), *binary, np.inf, a)])
     assert library.compile_function(f)
     points = np.random.default_rng(1).uniform(0.1, 0.9, size=5 * 2)

@@ -291,6 +291,8 @@ def test_other_solvers_find_the_same(robot, forward, solver):
     ("wanted", "code", "sentence"),
     [
         (MotionRequest(motion="jmp"), RefusalCode.UNKNOWN_MOTION, "did you mean 'jump'"),
+        (MotionRequest(motion="j" * 300), RefusalCode.UNKNOWN_MOTION, "unknown motion"),
+        (MotionRequest(motion="../motions/jump"), RefusalCode.UNKNOWN_MOTION, "unknown motion"),
         (jump(3.0, 0.0), RefusalCode.NO_SOLUTION, "binds: .*(friction|torque|voltage)"),
         (jump(10.0, 0.0), RefusalCode.OUT_OF_REACH, "single rigid body"),
         (jump(40.0, 0.0), RefusalCode.OUT_OF_REACH, "out of reach"),

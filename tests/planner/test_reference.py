@@ -156,7 +156,9 @@ def test_arms_that_shift_the_centre_of_mass_leave_the_feet_where_they_are_to_lan
 
 
 @pytest.mark.parametrize("displacement", [*GOALS, (0.0, 1.2, 0.0), (-0.9, 1.0, 0.0)], ids=str)
-def test_the_feet_centre_lands_at_the_goal_even_where_legs_do_not_reach_as_far_ahead_as_they_should(a_robot, displacement):
+def test_the_feet_centre_lands_at_the_goal_even_where_legs_do_not_reach_as_far_ahead_as_they_should(
+    a_robot, displacement
+):
     robot, model = a_robot
     schedule, reference = jump(robot, model, displacement)
     pose = reference.landing_joint_position[None]

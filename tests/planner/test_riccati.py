@@ -100,3 +100,13 @@ def test_without_a_minimum_it_says_so_and_more_curvature_makes_one():
     lq.add_to_diagonal(100.0)
     assert lq.solve()
     np.testing.assert_allclose(residuals(lq)[0], 0.0, atol=1e-8)
+
+
+def test_rows_of_states_that_pile_up_from_stage_to_stage_are_refused_and_not_written_beyond_the_memory():
+    """Nothing controls these states, so that every stage hands all its rows to the one before."""
+    K = 8
+    links = [np.array([[0, 0], [1, 1]])] * (K - 1) + [np.zeros((0, 2), dtype=int)]
+    lq = LinearQuadratic(np.full(K, 2), np.zeros(K, dtype=int), np.full(K, 2), links)
+    lq.Q[:], lq.C[:] = np.eye(2), np.eye(2)
+    lq.F[:] = 1.0
+    assert not lq.solve()

@@ -1,5 +1,7 @@
 """The stage-wise problem against a closed form, against CasADi's own derivatives, and the solvers against each other."""
 
+import dataclasses
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -7,7 +9,7 @@ from scipy.linalg import solve_discrete_are
 
 from aerial_planner.nlp import FlatProgram
 from aerial_planner.solver import SolverName, SolverOptions
-from aerial_planner.stage import Rows, StageData, StageKind
+from aerial_planner.stage import Rows, StageData
 from aerial_planner.transcription import Problem
 
 DT, N = 0.1, 60
@@ -104,3 +106,26 @@ def test_stages_that_do_not_fit_are_refused():
     kinds = [Rows().stage("a", x, none, none, ca.SX(0), x), Rows().stage("b", y, none, none, ca.SX(0), None)]
     with pytest.raises(ValueError, match="stage a leads to 1 states, b has 2"):
         Problem(kinds, SolverOptions())
+
+
+def test_derivatives_through_a_shorthand_are_those_without():
+    x, u, p, y = ca.SX.sym("x", 2), ca.SX.sym("u"), ca.SX.sym("p"), ca.SX.sym("y", 2)
+    y_is = ca.vertcat(x[0] * u + p, ca.sin(x[1]) * x[0])
+    rows = Rows()
+    rows.between("limit", ca.vertcat(y[0] ** 3 * u, ca.cos(y[1]) * x[1] + y[0]), -1.0, 1.0)
+    short = rows.stage("short", x, u, p, y[0] ** 2 * y[1] + u**2, ca.vertcat(x[1] * u, x[0]), y=y, y_is=y_is)
+    in_full = [ca.substitute(expression, y, y_is) for expression in (short.cost, short.constraints)]
+    nothing = ca.SX(0, 1)
+    long = dataclasses.replace(short, cost=in_full[0], constraints=in_full[1], y=nothing, y_is=nothing)
+    rng = np.random.default_rng(0)
+    functions = [[*kind.together(), *vars(kind.functions()).values()] for kind in (short, long)]
+    for ours, theirs in zip(*functions, strict=True):
+        arguments = [rng.normal(size=theirs.size_in(i)) for i in range(theirs.n_in())]
+        for a, b in zip(ours.call(arguments), theirs.call(arguments), strict=True):
+            np.testing.assert_allclose(ca.DM(a).full(), ca.DM(b).full(), atol=1e-12)
+
+
+def test_what_a_stage_leads_to_cannot_be_said_in_shorthand():
+    x, u, y = ca.SX.sym("x"), ca.SX.sym("u"), ca.SX.sym("y")
+    with pytest.raises(ValueError, match="next_state must not depend on y"):
+        Rows().stage("stage", x, u, ca.SX(0, 1), u**2, x + y, y=y, y_is=x * u)

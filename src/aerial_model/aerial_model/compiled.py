@@ -12,7 +12,9 @@ from numba import njit
 from aerial_model import actuator, rotation
 
 compiled = njit(cache=True, error_model="numpy")
-reordered = njit(cache=True, error_model="numpy", fastmath={"contract", "nnan", "nsz", "reassoc"})  # sums in any order: several at once
+reordered = njit(
+    cache=True, error_model="numpy", fastmath={"contract", "nnan", "nsz", "reassoc"}
+)  # sums in any order: several at once
 
 product_of = compiled(rotation.product_of)
 exp_of = compiled(rotation.exp_of)
@@ -64,8 +66,8 @@ def cholesky(A: np.ndarray, L: np.ndarray) -> float:
 
 
 @compiled
-def cholesky_solve(L: np.ndarray, B: np.ndarray) -> None:
-    """Replace B ``(m, k)`` by the solution X of L Lᵀ X = B."""
+def lower_solve(L: np.ndarray, B: np.ndarray) -> None:
+    """Replace B ``(m, k)`` by the solution X of L X = B."""
     m, k = B.shape
     for i in range(m):
         for j in range(i):
@@ -73,12 +75,25 @@ def cholesky_solve(L: np.ndarray, B: np.ndarray) -> None:
                 B[i, c] -= L[i, j] * B[j, c]
         for c in range(k):
             B[i, c] /= L[i, i]
+
+
+@compiled
+def upper_solve(L: np.ndarray, B: np.ndarray) -> None:
+    """Replace B ``(m, k)`` by the solution X of Lᵀ X = B."""
+    m, k = B.shape
     for i in range(m - 1, -1, -1):
         for j in range(i + 1, m):
             for c in range(k):
                 B[i, c] -= L[j, i] * B[j, c]
         for c in range(k):
             B[i, c] /= L[i, i]
+
+
+@compiled
+def cholesky_solve(L: np.ndarray, B: np.ndarray) -> None:
+    """Replace B ``(m, k)`` by the solution X of L Lᵀ X = B."""
+    lower_solve(L, B)
+    upper_solve(L, B)
 
 
 @compiled

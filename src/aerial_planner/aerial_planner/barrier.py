@@ -45,7 +45,7 @@ class Bounds(NamedTuple):
 
 @compiled
 def logarithms(bounds: Bounds, s: np.ndarray) -> float:
-    """Return the sum of the logarithms of all distances, which is not finite if one is not positive.
+    """Return the sum of the logarithms of all distances; not finite if one is not positive, or next to nothing.
 
     Distances are multiplied as long as the product is in range, for a logarithm takes ten times as long.
     """
@@ -176,7 +176,7 @@ def misses(
 
 
 @compiled
-def total(a: np.ndarray) -> float:
+def norm_1(a: np.ndarray) -> float:
     """Return the sum of the sizes of all entries."""
     size = 0.0
     for i in range(len(a)):

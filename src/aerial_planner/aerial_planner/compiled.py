@@ -53,6 +53,9 @@ class CompiledFunction:
         self._function = getattr(library, name)
         self._function.argtypes = [ctypes.c_long, ctypes.c_void_p, ctypes.c_void_p]
         self._function.restype = None
+        address = ctypes.addressof(ctypes.c_int.in_dll(library, f"{name}_inputs"))
+        (n_arguments,) = (ctypes.c_int * 1).from_address(address)
+        self._inputs = list((ctypes.c_int * n_arguments).from_address(address + ctypes.sizeof(ctypes.c_int)))
         address = ctypes.addressof(ctypes.c_int.in_dll(library, f"{name}_nonzeros"))
         self._nonzeros: list[np.ndarray] = []
         for _ in range(n_results):
@@ -70,8 +73,11 @@ class CompiledFunction:
         rows = [*arguments, *results]
         if not all(row.flags.c_contiguous and row.dtype == np.float64 for row in rows):
             raise ValueError("expected rows of float64, one number after the other")
+        check_sizes(self._function.__name__, arguments, [n * size for size in self._inputs])
         check_sizes(self._function.__name__, results, [n * len(at) for at in self._nonzeros])
-        takes, gives = ((ctypes.c_void_p * len(part))(*(row.ctypes.data for row in part)) for part in (arguments, results))
+        takes, gives = (
+            (ctypes.c_void_p * len(part))(*(row.ctypes.data for row in part)) for part in (arguments, results)
+        )
         function = self._function
 
         def evaluate(_: list[np.ndarray] = rows) -> None:  # which keeps the memory
@@ -100,6 +106,10 @@ class FunctionLibrary:
             values=CompiledFunction(library, f"{kind.name}_values", 3),
             derivatives=CompiledFunction(library, f"{kind.name}_derivatives", 5),
         )
+
+    def has(self, kind: StageKind) -> bool:
+        """Return whether a stage kind is compiled."""
+        return self._file(kind.name, _expressions(kind)).is_file()
 
     def load_function(self, function: ca.Function) -> CompiledFunction | None:
         """Return a compiled function, None if there is none."""
@@ -140,7 +150,9 @@ class FunctionLibrary:
 
     def _file(self, name: str, expressions: ca.Function) -> Path:
         """Return the file of what has these expressions, by their hash and that of how they become machine code."""
-        digest = hashlib.sha256("\n".join([expressions.serialize(), ca.__version__, platform.machine(), *_FLAGS]).encode())
+        digest = hashlib.sha256(
+            "\n".join([expressions.serialize(), ca.__version__, platform.machine(), *_FLAGS]).encode()
+        )
         for module in (stage, vector_code):
             digest.update(Path(module.__file__).read_bytes())
         digest.update(_processor().encode())

@@ -75,14 +75,14 @@ class Batch:
 
     Args:
         function: of dense columns.
-        compiled: returns a function's machine code, None if there is none.
+        machine_code: returns that of a function, None if there is none.
     """
 
-    def __init__(self, function: ca.Function, compiled: Callable[[ca.Function], Pointwise | None]) -> None:
+    def __init__(self, function: ca.Function, machine_code: Callable[[ca.Function], Pointwise | None]) -> None:
         arguments = function.sx_in()
         results = [ca.densify(ca.vec(result)) for result in function.call(arguments)]
         self.function = ca.Function(function.name(), arguments, results, {"cse": True})
-        self._compiled = compiled
+        self._machine_code = machine_code
         self._memory: dict[int, Memory] = {}  # by the number of points
 
     def __call__(self, *arguments: np.ndarray) -> list[np.ndarray]:
@@ -94,9 +94,14 @@ class Batch:
         memory.evaluate()
         return [result.reshape(K, -1).copy() for result in memory.results]
 
+    def renew(self) -> None:
+        """Look for machine code again."""
+        self._memory.clear()
+        self.__dict__.pop("_pointwise", None)
+
     @cached_property
     def _pointwise(self) -> Pointwise:
-        return self._compiled(self.function) or Interpreted(self.function)
+        return self._machine_code(self.function) or Interpreted(self.function)
 
     def memory(self, n: int) -> Memory:
         """Return the memory for n points, which is always the same."""
@@ -108,7 +113,7 @@ class Batch:
         return self._memory[n]
 
 
-def interpreted(function: ca.Function) -> None:  # noqa: ARG001
+def no_machine_code(function: ca.Function) -> None:
     """Have no machine code for any function."""
 
 

@@ -204,7 +204,7 @@ class _Iteration:
         cost = self.stages.evaluate(w)
         c = np.concatenate([self.stages.miss, self.stages.equality_miss(), w[self.fixed] - self.lower[self.fixed]])
         gap = self._inequalities(w) - s
-        theta = barrier.total(c) + barrier.total(gap)
+        theta = barrier.norm_1(c) + barrier.norm_1(gap)
         return _Point(w=w, s=s, cost=cost, c=c, gap=gap, theta=theta, logarithms=barrier.logarithms(self.bounds, s))
 
     def _phi(self, point: _Point) -> float:
@@ -225,8 +225,8 @@ class _Iteration:
     def _errors(self) -> _Errors:
         """Return how far the point is from an optimum."""
         z_low, z_high, point, n_z = self.z_low, self.z_high, self.point, self.n_bounds
-        duals = barrier.total(z_low) + barrier.total(z_high)
-        s_d = max(_SCALE_MAX, (barrier.total(self.lam) + duals) / max(1, len(self.lam) + n_z)) / _SCALE_MAX
+        duals = barrier.norm_1(z_low) + barrier.norm_1(z_high)
+        s_d = max(_SCALE_MAX, (barrier.norm_1(self.lam) + duals) / max(1, len(self.lam) + n_z)) / _SCALE_MAX
         s_c = max(_SCALE_MAX, duals / max(1, n_z)) / _SCALE_MAX
         slope, violation = barrier.misses(self.stages.lagrangian, self.nu, z_low, z_high, point.c, point.gap)
         least, most = barrier.products(self.bounds, point.s, z_low, z_high)
@@ -362,6 +362,4 @@ class _Iteration:
         """Move the multipliers of the point that was left (14), and keep those of bounds in range (16)."""
         self.lam += length * (lam - self.lam)
         self.nu += length * (nu - self.nu)
-        barrier.move_multipliers(
-            self.bounds, point.s, self.point.s, ds, self.z_low, self.z_high, self.mu, self._keep
-        )
+        barrier.move_multipliers(self.bounds, point.s, self.point.s, ds, self.z_low, self.z_high, self.mu, self._keep)

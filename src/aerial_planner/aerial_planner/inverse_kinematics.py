@@ -9,7 +9,7 @@ import numpy as np
 
 from aerial_model.compiled import cholesky, cholesky_solve, compiled
 from aerial_model.robot import Robot
-from aerial_planner.in_place import Batch, Pointwise, interpreted
+from aerial_planner.in_place import Batch, Pointwise, no_machine_code
 from aerial_planner.symbolic import BaseFrameModel
 
 _ITERATIONS = 12
@@ -22,11 +22,14 @@ class InverseKinematics:
     """Solves for the feet's positions relative to the centre of mass, in base axes."""
 
     def __init__(
-        self, robot: Robot, model: BaseFrameModel, compiled: Callable[[ca.Function], Pointwise | None] = interpreted
+        self,
+        robot: Robot,
+        model: BaseFrameModel,
+        machine_code: Callable[[ca.Function], Pointwise | None] = no_machine_code,
     ) -> None:
         q = ca.SX.sym("q", robot.n_joints)
         relative = ca.reshape(model.feet(q) - ca.repmat(model.com(q), 1, robot.n_contacts), -1, 1)
-        self.feet = Batch(ca.Function("feet_from_com", [q], [relative, ca.jacobian(relative, q)]), compiled)
+        self.feet = Batch(ca.Function("feet_from_com", [q], [relative, ca.jacobian(relative, q)]), machine_code)
         self._range = robot.planning_range
         self.solve(np.zeros((1, robot.n_contacts, 3)), robot.poses["home"])  # so that no plan waits for Numba
 
@@ -81,4 +84,3 @@ def _step(
             largest = max(largest, abs(to - q[k, i]))
             q[k, i] = to
     return largest
-

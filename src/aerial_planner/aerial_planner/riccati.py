@@ -6,8 +6,8 @@
 This is a Newton step of an interior-point method. The recursion is Riccati's, extended to constraints as by Vanroye,
 Sathya, De Schutter and Decré, *FATROP: A fast constrained optimal control problem solver*, IROS 2023: from the last stage
 backward, rows that say something of the controls eliminate as many of them; what rows say of the state alone is handed to
-the stage before. Products of matrices are BLAS's (through SciPy), which is what makes it fast: a knot of a quadruped
-takes 0.03 ms.
+the stage before. Products of dense matrices are BLAS's (through SciPy), those with F, which is sparse, loops: a knot of a
+quadruped takes 0.03 ms.
 
 Stages differ in size, so what belongs to them lies in arrays with a row for each that are as wide as the widest needs.
 """
@@ -18,7 +18,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from aerial_model.compiled import cholesky, compiled, reordered
+from aerial_model.compiled import cholesky, compiled, lower_solve, reordered, upper_solve
 
 _RANK = 1e-9  # a pivot smaller than this share of the largest coefficient is none
 
@@ -49,7 +49,7 @@ class LinearQuadratic:
         self.constraints = np.zeros((K, c))  # multipliers of C_k y_k + c_k = 0
         rows = c + x  # of a stage: its own and those of the state after it
         self._factor = (
-            np.zeros((K + 1, x, x + 1)),  # P, p: the cost to go
+            np.zeros((K, x, x + 1)),  # P, p: the cost to go
             np.zeros((K + 1, rows, x + 1)),  # H, h: what is asked of the state
             np.zeros(K + 1, dtype=np.int64),  # how many rows that has
             np.zeros((K + 1, rows), dtype=np.int64),  # which of the stage's rows they are
@@ -67,7 +67,10 @@ class LinearQuadratic:
         self.Q[:, every, every] += value
 
     def solve(self) -> bool:
-        """Write the solution and the multipliers; return False if there is no minimum: a direction has no curvature."""
+        """Write the solution and the multipliers; return False if there is no minimum.
+
+        That is, a direction has no curvature, or rows of the states alone pile up from stage to stage.
+        """
         sizes = self.nx, self.nu, self.nc
         steps = self.n_links, self.links, self.F, self.f
         if not _backward(*sizes, *steps, self.Q, self.q, self.C, self.c, self._factor):
@@ -217,19 +220,9 @@ def _minimized(M: np.ndarray, rank: int, free: int, gains: np.ndarray) -> tuple:
             row = M[rank + i, first:]
             for j in range(left):
                 V[i, j] = row[j]
-        for i in range(free):
-            for j in range(i):
-                for a in range(left):
-                    V[i, a] -= L[i, j] * V[j, a]
-            for a in range(left):
-                V[i, a] /= L[i, i]
+        lower_solve(L, V)
         cost -= np.dot(V.T, V)
-        for i in range(free - 1, -1, -1):
-            for j in range(i + 1, free):
-                for a in range(left):
-                    V[i, a] -= L[j, i] * V[j, a]
-            for a in range(left):
-                V[i, a] /= L[i, i]
+        upper_solve(L, V)
         for i in range(free):
             for a in range(left):
                 gains[i, a] = -V[i, a]
@@ -266,6 +259,8 @@ def _backward(
         after, x_next = (n_h[k + 1], nx[k + 1]) if follows else (0, 0)
         links, steps = all_links[max(k, 0), : n_links[max(k, 0)]], F[max(k, 0)]
         m = own + after
+        if m > T.shape[1]:
+            return False  # rows of states pile up that no control can satisfy
 
         # What the variables must satisfy, U u + X [x; 1] = 0: own rows, and what is asked of the next state.
         U, X, change = np.zeros((m, u)), np.zeros((m, x + 1)), np.eye(m)
@@ -344,6 +339,8 @@ def _backward(
             for j in range(x):
                 largest = max(largest, abs(X[i, j]))
             if largest > _RANK:
+                if count == H.shape[1]:
+                    return False
                 for j in range(x + 1):
                     H[k, count, j] = X[i, j]
                 kept[k, count] = i

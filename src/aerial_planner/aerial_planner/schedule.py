@@ -146,6 +146,13 @@ def _folders(robot: Robot) -> list[Path]:
     return [motions_folder(), *(folder / "motions" for folder in reversed(robot.folders))]
 
 
+def _is_there(file: Path) -> bool:
+    try:
+        return file.is_file()
+    except (OSError, ValueError):  # a name that no file can have
+        return False
+
+
 def load_motion(name: str, robot: Robot) -> Motion:
     """Return a motion of a robot by name.
 
@@ -153,7 +160,7 @@ def load_motion(name: str, robot: Robot) -> Motion:
         RefusalError: if there is none of that name, with the names that exist.
     """
     files = [folder / f"{name}.yaml" for folder in reversed(_folders(robot))]
-    file = next((file for file in files if file.is_file() and file.stem == name), None)
+    file = next((file for file in files if file.stem == name and _is_there(file)), None)
     if file is None:
         known = known_motions(robot)
         raise RefusalError(

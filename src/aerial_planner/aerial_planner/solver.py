@@ -24,7 +24,7 @@ class SolverOptions:
     tolerance: float = 1e-4  # on optimality and constraints
     max_iterations: int = 100
     initial_barrier: float = 1.0  # μ_0 of the interior-point method: high, where the guess is outside of the limits
-    barrier_accuracy: float = 300.0  # how far a barrier problem is solved before the next, in multiples of μ
+    barrier_accuracy: float = 100.0  # how far a barrier problem is solved before the next, in multiples of μ
     bound_distance: float = 0.3  # of the guess from its bounds, as a share of their range (or of 1, if smaller)
 
 

@@ -37,7 +37,9 @@ from aerial_planner.trajectory import TakeOffTrajectory
 from aerial_planner.transcription import Solution
 
 _ITERATIONS_MAX = 35  # of one try: those that succeed take 8 to 30
-_TOLERANCE = 0.1  # of its optimum, which is but a start: what follows takes as many iterations, this one two or three less
+_TOLERANCE = (
+    0.1  # of its optimum, which is but a start: what follows takes as many iterations, this one two or three less
+)
 _REACH_SAMPLES = 2000  # random poses from which the longest leg is read
 
 
@@ -204,9 +206,7 @@ class SingleRigidBody(Formulation):
             p = [[schedule.dt], reference.com[k], reference.com_velocity[k], reference.orientation[k]]
             p += [foot_ref, reference.x_0[:13]]
             u = push[k][loaded].ravel()
-            stages.append(
-                StageData.free(p=np.concatenate(p), x=x[k], u=u, u_min=least[:n_f], u_max=greatest[:n_f])
-            )
+            stages.append(StageData.free(p=np.concatenate(p), x=x[k], u=u, u_min=least[:n_f], u_max=greatest[:n_f]))
         share, T = np.array([1 / schedule.flight_knots]), np.array([schedule.flight_time])
         shortest, longest = (np.array([bound]) for bound in schedule.flight_time_range)
         p = [share, T, reference.landing_com, foot_ref]

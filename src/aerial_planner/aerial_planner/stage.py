@@ -36,6 +36,11 @@ class StageKind:
     y: ca.SX = field(default_factory=lambda: ca.SX(0, 1))  # (n_y,)
     y_is: ca.SX = field(default_factory=lambda: ca.SX(0, 1))  # (n_y,) of x, u and p
 
+    def __post_init__(self) -> None:
+        for what, expression in (("next_state", self._dynamics), ("y_is", self.y_is)):
+            if self.y.numel() > 0 and ca.depends_on(expression, self.y):
+                raise ValueError(f"stage {self.name}: {what} must not depend on y")
+
     @property
     def n_next(self) -> int:
         """Number of states of the next knot."""
@@ -129,7 +134,9 @@ class StageEvaluation(NamedTuple):
     """The functions of a stage kind, for many knots at once."""
 
     values: Pointwise  # (z, p) ↦ cost, next state, constraints
-    derivatives: Pointwise  # (z, p, λ_dynamics, λ_constraints) ↦ those of ``StageFunctions``, in its order, with λ_f = 1
+    derivatives: (
+        Pointwise  # (z, p, λ_dynamics, λ_constraints) ↦ those of ``StageFunctions``, in its order, with λ_f = 1
+    )
 
 
 class Rows:

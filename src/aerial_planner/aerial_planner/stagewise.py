@@ -173,7 +173,7 @@ class _Pattern(NamedTuple):
 
     F_at: np.ndarray  # row and column of each (n_F, 2)
     H_at: np.ndarray  # the same (n_H, 2)
-    n_G: int
+    n_entries: int
     n_unequal: int
     # Of the constraints' Jacobian each entry's number in G, its row and its column (·, 3):
     equal: np.ndarray  # of equalities, rows numbered among these
@@ -201,7 +201,7 @@ class _Pattern(NamedTuple):
         return _Pattern(
             F_at=F_at,
             H_at=place[H_at],
-            n_G=len(G_at),
+            n_entries=len(G_at),
             n_unequal=int((~equal).sum()),
             equal=entries(equal, equal),
             dense=entries(many, many),
@@ -253,7 +253,7 @@ class _Tables(NamedTuple):
             run=run,
             z_0=z_0,
             F_0=of_knots([len(pattern.F_at) for pattern in patterns]),
-            G_0=of_knots([pattern.n_G for pattern in patterns]),
+            G_0=of_knots([pattern.n_entries for pattern in patterns]),
             H_0=of_knots([len(pattern.H_at) for pattern in patterns]),
             unequal_0=of_knots([pattern.n_unequal for pattern in patterns]),
             **{name: np.concatenate(parts) for name, parts in tables.items()},

@@ -20,7 +20,7 @@ import numpy as np
 import pinocchio as pin
 
 from aerial_model.robot import Robot
-from aerial_planner.in_place import Batch, Pointwise, interpreted
+from aerial_planner.in_place import Batch, Pointwise, no_machine_code
 
 _ROUNDING = 1e-12  # entries of constant placements below this are rounding, and cost operations
 
@@ -35,7 +35,7 @@ class BaseFrameModel:
     foot_jacobians: ca.Function  # q_j ↦ stacked ∂foot_i/∂q_j (3 n_c, n), sparse
     angular_momentum: ca.Function  # q_j, ω (3,) in B, q̇_j (n,) ↦ α_B (3,) about the centre of mass [kg·m²/s]
     inertia: ca.Function  # q_j ↦ locked rotational inertia about the centre of mass (3, 3) [kg·m²]
-    compiled: Callable[[ca.Function], Pointwise | None] = interpreted  # how numbers are had
+    machine_code: Callable[[ca.Function], Pointwise | None] = no_machine_code  # how numbers are had
 
     def coms(self, q_j: np.ndarray) -> np.ndarray:
         """Return the centre of mass ``(K, 3)`` [m] with the joints at ``(K, n)`` [rad]."""
@@ -52,17 +52,17 @@ class BaseFrameModel:
 
     @cached_property
     def _com(self) -> Batch:
-        return Batch(self.com, self.compiled)
+        return Batch(self.com, self.machine_code)
 
     @cached_property
     def _feet(self) -> Batch:
-        return Batch(self.feet, self.compiled)
+        return Batch(self.feet, self.machine_code)
 
     @cached_property
     def _momenta(self) -> Batch:
         q_j, _, dq_j = self.angular_momentum.sx_in()
         still = self.angular_momentum(q_j, ca.SX.zeros(3), dq_j)
-        return Batch(ca.Function("momenta", [q_j, dq_j], [self.inertia(q_j), still]), self.compiled)
+        return Batch(ca.Function("momenta", [q_j, dq_j], [self.inertia(q_j), still]), self.machine_code)
 
     @property
     def batches(self) -> tuple[Batch, ...]:
@@ -71,13 +71,13 @@ class BaseFrameModel:
 
 
 def base_frame_model(
-    robot: Robot, compiled: Callable[[ca.Function], Pointwise | None] = interpreted
+    robot: Robot, machine_code: Callable[[ca.Function], Pointwise | None] = no_machine_code
 ) -> BaseFrameModel:
     """Return the CasADi functions of a robot.
 
     Args:
         robot: the robot.
-        compiled: returns a function's machine code, None if there is none.
+        machine_code: returns that of a function, None if there is none.
     """
     model = robot.model
     q = ca.SX.sym("q_j", robot.n_joints)
@@ -134,7 +134,7 @@ def base_frame_model(
         foot_jacobians=ca.Function("foot_jacobians", [q], [jacobians], names, ["J"]),
         angular_momentum=ca.Function("alpha", [q, omega, dq], [alpha], ["q_j", "omega", "dq_j"], ["alpha_B"]),
         inertia=ca.Function("inertia", [q], [inertia_at_com], names, ["I"]),
-        compiled=compiled,
+        machine_code=machine_code,
     )
 
 

@@ -76,8 +76,8 @@ def source(functions: Sequence[ca.Function]) -> str:
     """Return the C source of functions of SX.
 
     Each becomes ``void NAME(long n, const double *const *arguments, double *const *results)``, where each argument and
-    result is the nonzeros of n points, one point after the other; and ``const int NAME_nonzeros[]``, for each result their
-    number, then row and column of each.
+    result is the nonzeros of n points, one point after the other. ``const int NAME_inputs[]`` is the number of arguments, then
+    that of the nonzeros of each; ``NAME_nonzeros[]`` for each result their number, then row and column of each.
 
     Raises:
         UnknownOperationError: if one has an operation that is not known here.
@@ -103,6 +103,7 @@ def _function(f: ca.Function) -> str:
         pairs = zip(pattern.row(), pattern.get_col(), strict=True)
         nonzeros += [pattern.nnz(), *(index for pair in pairs for index in pair)]
     lines += [
+        f"const int {name}_inputs[] = {{{', '.join(map(str, [f.n_in(), *(f.nnz_in(i) for i in range(f.n_in()))]))}}};",
         f"const int {name}_nonzeros[] = {{{', '.join(map(str, [*nonzeros, 0]))}}};",
         f"void {name}(long n, const double *const *arguments, double *const *results) {{",
         *(f"  static __thread V {array}[{max(size, 1)}];" for array, size in sizes),

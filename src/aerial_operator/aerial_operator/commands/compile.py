@@ -29,6 +29,4 @@ def run(args: argparse.Namespace) -> Report:
     compiled = compile_functions(robot, known_motions(robot), args.variant or ["AAKD*"])
     seconds, folder = time.perf_counter() - began, str(default_cache())
     figures = {"robot": robot.name, "compiled": compiled, "seconds": seconds, "folder": folder}
-    return Report(
-        success=True, figures=figures, text=f"{compiled} libraries compiled in {seconds:.0f} s, in {folder}"
-    )
+    return Report(success=True, figures=figures, text=f"{compiled} libraries compiled in {seconds:.0f} s, in {folder}")
