@@ -86,7 +86,7 @@ def test_a_run_that_ends_before_a_phase_has_no_figures_of_it(robot, plan):
 
 
 def test_many_runs_are_pooled():
-    runs = [{"flight": dict.fromkeys(FIGURES, [value])} for value in (3.0, 4.0)]
+    runs = [{"flight": {name: [value] for name in FIGURES}} for value in (3.0, 4.0)]
     figures = summary([*runs, {}])
     assert tuple(figures) == ("flight",)
     assert figures["flight"]["com_m"]["rms"] == pytest.approx(np.sqrt(12.5))

@@ -233,6 +233,87 @@ def _minimized(M: np.ndarray, rank: int, free: int, gains: np.ndarray) -> tuple:
 
 
 @compiled
+def _own_rows(C: np.ndarray, c: np.ndarray, U: np.ndarray, X: np.ndarray) -> None:
+    """Write a stage's C (u, x) + c = 0 as the first rows of U u + X [x; 1] = 0."""
+    u, x = U.shape[1], X.shape[1] - 1
+    for i in range(len(c)):
+        for j in range(u):
+            U[i, j] = C[i, j]
+        for j in range(x):
+            X[i, j] = C[i, u + j]
+        X[i, x] = c[i]
+
+
+@compiled
+def _asked_rows(
+    H: np.ndarray, links: np.ndarray, F: np.ndarray, f: np.ndarray, own: int, U: np.ndarray, X: np.ndarray
+) -> None:
+    """Write what is asked of the next state, H [x; 1] = 0, as the rows of U u + X [x; 1] = 0 after the first ``own``."""
+    u, x = U.shape[1], X.shape[1] - 1
+    for i in range(len(U) - own):
+        X[own + i, x] = H[i, len(f)]
+        for n in range(len(links)):
+            amount, j = H[i, links[n, 0]] * F[n], links[n, 1]
+            if j < u:
+                U[own + i, j] += amount
+            else:
+                X[own + i, j - u] += amount
+        for j in range(len(f)):
+            X[own + i, x] += H[i, j] * f[j]
+
+
+@compiled
+def _eliminated(U: np.ndarray, X: np.ndarray, rank: int) -> np.ndarray:
+    """Return N ``(rank, ·)`` of reduced rows: the first controls are −N times the others, the state and one."""
+    free, x = U.shape[1] - rank, X.shape[1]
+    N = np.empty((rank, free + x))
+    for i in range(rank):
+        row, into = U[i, rank:], N[i, free:]
+        for j in range(free):
+            N[i, j] = row[j]
+        for j in range(x):
+            into[j] = X[i, j]
+    return N
+
+
+@compiled
+def _own_cost(Q: np.ndarray, q: np.ndarray, u: int, place: np.ndarray) -> np.ndarray:
+    """Return ½ yᵀ Q y + qᵀ y as a matrix of [y; 1], controls at their ``place``; only its upper triangle counts."""
+    y = len(place) - 1
+    M = np.zeros((y + 1, y + 1))
+    for i in range(y):
+        into, row = M[place[i]], Q[i]
+        for j in range(u):
+            into[place[j]] = row[j]
+        into, row = into[u:], row[u:]
+        for j in range(y - u):
+            into[j] = row[j]
+        into[y - u] = q[i]
+    return M
+
+
+@compiled
+def _hand_on(X: np.ndarray, rank: int, H: np.ndarray, kept: np.ndarray) -> int:
+    """Write the rows after the first ``rank`` that say something of the state, and which these are; return how many.
+
+    It is −1 if there are more than H has room for.
+    """
+    count, x = 0, X.shape[1] - 1
+    for i in range(rank, len(X)):
+        largest = 0.0
+        for j in range(x):
+            largest = max(largest, abs(X[i, j]))
+        if largest > _RANK:
+            if count == len(H):
+                return -1
+            for j in range(x + 1):
+                H[count, j] = X[i, j]
+            kept[count] = i
+            count += 1
+    return count
+
+
+@compiled
 def _backward(
     nx: np.ndarray,
     nu: np.ndarray,
@@ -251,101 +332,46 @@ def _backward(
     P, H, n_h, kept, T, ranks, orders, others, slopes, gains = factor
     K = len(nx)
     to_go = np.zeros((1, 1))  # [x; 1] of the stage after
+    itself = np.empty((nx[0], 2), dtype=np.int64)  # links of the step before the first
+    itself[:, 0] = itself[:, 1] = np.arange(nx[0])
     for k in range(K - 1, -2, -1):
         # The first state is like controls of a stage before it, K as it were, that costs nothing by itself.
-        at = k if k >= 0 else K
-        x, u, own = (nx[k], nu[k], nc[k]) if k >= 0 else (0, nx[0], 0)
-        y, follows = x + u, k + 1 < K
-        after, x_next = (n_h[k + 1], nx[k + 1]) if follows else (0, 0)
-        links, steps = all_links[max(k, 0), : n_links[max(k, 0)]], F[max(k, 0)]
+        first = k < 0
+        at = K if first else k
+        x, u, own = (0, nx[0], 0) if first else (nx[k], nu[k], nc[k])
+        after, x_next = (n_h[k + 1], nx[k + 1]) if k + 1 < K else (0, 0)
+        links = itself if first else all_links[k, : n_links[k]]
+        steps, offset = (np.ones(u), np.zeros(u)) if first else (F[k], f[k, :x_next])
         m = own + after
         if m > T.shape[1]:
             return False  # rows of states pile up that no control can satisfy
 
-        # What the variables must satisfy, U u + X [x; 1] = 0: own rows, and what is asked of the next state.
         U, X, change = np.zeros((m, u)), np.zeros((m, x + 1)), np.eye(m)
-        for i in range(own):
-            for j in range(u):
-                U[i, j] = C[k, i, j]
-            for j in range(x):
-                X[i, j] = C[k, i, u + j]
-            X[i, x] = c[k, i]
-        for i in range(after):
-            X[own + i, x] = H[k + 1, i, x_next]
-            if k < 0:
-                for j in range(u):
-                    U[i, j] = H[0, i, j]
-                continue
-            for n in range(len(links)):
-                amount, j = H[k + 1, i, links[n, 0]] * steps[n], links[n, 1]
-                if j < u:
-                    U[own + i, j] += amount
-                else:
-                    X[own + i, j - u] += amount
-            for j in range(x_next):
-                X[own + i, x] += H[k + 1, i, j] * f[k, j]
+        if own > 0:
+            _own_rows(C[k], c[k, :own], U, X)
+        if after > 0:
+            _asked_rows(H[k + 1], links, steps, offset, own, U, X)
         order = np.arange(u)
         rank = _reduce(U, change, order)
         X = np.dot(change, X)
-        ranks[at] = rank
-        orders[at, :u] = order
-        rest = y + 1 - rank
-        N = np.empty((rank, rest))
-        for i in range(m):
-            for j in range(m):
-                T[at, i, j] = change[i, j]
-        for i in range(rank):
-            row = U[i, rank:]
-            for j in range(u - rank):
-                N[i, j] = row[j]
-            row = N[i, u - rank :]
-            for j in range(x + 1):
-                row[j] = X[i, j]
-            for j in range(rest):
-                others[at, i, j] = N[i, j]
+        N = _eliminated(U, X, rank)
+        place = np.arange(u + x + 1)
+        place[order] = np.arange(u)
+        ranks[at], orders[at, :u] = rank, order
+        T[at, :m, :m], others[at, :rank, : N.shape[1]] = change, N
 
-        # ½ [y; 1]ᵀ M [y; 1]: the cost from here on, controls in their new order.
-        place = np.arange(y + 1)
-        for i in range(u):
-            place[order[i]] = i
-        M = np.zeros((y + 1, y + 1))
-        for i in range(y if k >= 0 else 0):
-            into, row = M[place[i]], Q[k, i]
-            for j in range(u):
-                into[place[j]] = row[j]
-            into, row = into[u:], row[u:]
-            for j in range(x):
-                into[j] = row[j]
-            into[x] = q[k, i]
-        if k >= 0 and follows:
-            _add_cost_to_go(M, to_go, links, steps, f[k], place)
-        elif follows:
-            for i in range(u + 1):
-                for j in range(u + 1):
-                    M[place[i], place[j]] = to_go[i, j]
-        _eliminate(M, N, slopes[at, :rank, :rest])
+        M = np.zeros((u + 1, u + 1)) if first else _own_cost(Q[k], q[k], u, place)
+        if k + 1 < K:
+            _add_cost_to_go(M, to_go, links, steps, offset, place)
+        _eliminate(M, N, slopes[at, :rank, : N.shape[1]])
         to_go, bounded = _minimized(M, rank, u - rank, gains[at])
         if not bounded:
             return False
-        if k < 0:
-            break
-        for i in range(x):
-            for j in range(x + 1):
-                P[k, i, j] = to_go[i, j]
-        # Rows without controls: those that say something are asked of the state.
-        count = 0
-        for i in range(rank, m):
-            largest = 0.0
-            for j in range(x):
-                largest = max(largest, abs(X[i, j]))
-            if largest > _RANK:
-                if count == H.shape[1]:
-                    return False
-                for j in range(x + 1):
-                    H[k, count, j] = X[i, j]
-                kept[k, count] = i
-                count += 1
-        n_h[k] = count
+        if not first:
+            P[k, :x, : x + 1] = to_go[:x]
+            n_h[k] = _hand_on(X, rank, H[k], kept[k])
+            if n_h[k] < 0:
+                return False
     return True
 
 
