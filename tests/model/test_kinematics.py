@@ -84,7 +84,9 @@ def test_a_configuration_is_what_pinocchio_says(state):
     pin.updateFramePlacements(model, data)
     M = np.triu(data.M) + np.triu(data.M, 1).T
     np.testing.assert_allclose(here.M, M, atol=1e-12)
-    np.testing.assert_allclose(here.M_inv @ M, np.eye(model.nv), atol=1e-9)
+    np.testing.assert_allclose(here.L.T @ here.L, M, atol=1e-12)
+    np.testing.assert_array_equal(here.L, np.tril(here.L))
+    assert not here.L[9:12, 6:9].any()  # of another leg
     np.testing.assert_allclose(here.nle, data.nle, atol=1e-11)
     np.testing.assert_allclose(here.com, data.com[0], atol=1e-12)
     axes = pin.LOCAL_WORLD_ALIGNED

@@ -7,11 +7,13 @@ import pinocchio as pin
 import pytest
 
 from aerial_model import rotation
-from aerial_model.kinematics import Kinematics
+from aerial_model.kinematics import Kinematics, factorize
 from aerial_model.plan import Plan
 from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, JOINT_POSITION, JOINT_VELOCITY, Robot
 from aerial_wbic.gains import ControllerGains
-from aerial_wbic.target import BodyTarget, WholeBodyTarget
+from aerial_wbic.hierarchy import decided, priorities, subordinate
+from aerial_wbic.target import blank_target
+from aerial_wbic.tasks import command
 
 GRAVITY = 9.81  # [m/s²]
 DT = 0.01  # between knots [s]
@@ -61,20 +63,46 @@ def target_at(robot, gains):
             "orientation": state.base_orientation,
             "angular_velocity": state.R_WB @ state.v[3:6],
             "angular_acceleration": zero,
-            "gains": gains.follow,
         }
-        return WholeBodyTarget(
-            body=BodyTarget(**{**body, **changes}),
-            joint_position=state.q[JOINT_POSITION],
-            joint_velocity=state.v[JOINT_VELOCITY],
-            joint_acceleration=np.zeros(robot.n_joints),
-            angular_momentum=state.angular_momentum,
-            angular_momentum_rate=zero,
-            force=np.zeros((robot.n_contacts, 3)),
-            contact=contact,
-        )
+        target = blank_target(robot.n_joints, robot.n_contacts, gains.follow)
+        for name, value in {**body, **changes}.items():
+            getattr(target.body, name)[:] = value
+        target.joint_position[:] = state.q[JOINT_POSITION]
+        target.joint_velocity[:] = state.v[JOINT_VELOCITY]
+        target.angular_momentum[:] = state.angular_momentum
+        target.contact[:] = contact
+        return target
 
     return target_at
+
+
+@pytest.fixture(scope="session")
+def prioritized():
+    """q̈ and q̇_ref of tasks in falling priority, for a mass matrix H: ``prioritized(H, tasks)``."""
+
+    def prioritized(H, tasks):
+        L = np.zeros_like(H)
+        factorize(H, L)
+        memory, owned = priorities(L), 0
+        for task in tasks:
+            owned = subordinate(memory, owned, task)
+        vdot, v_ref = np.empty((2, len(H)))
+        decided(memory, vdot, v_ref)
+        return vdot, v_ref
+
+    return prioritized
+
+
+@pytest.fixture(scope="session")
+def commanded():
+    """q̈ and q̇_ref of the controller's tasks: ``commanded(state, target, joints, arrangement)``."""
+
+    def commanded(state, target, joints, arrangement):
+        vdot, v_ref = np.empty((2, len(state.v)))
+        command(state.block, target.block, joints, arrangement, vdot, v_ref)
+        return vdot, v_ref
+
+    return commanded
 
 
 @pytest.fixture(scope="session")

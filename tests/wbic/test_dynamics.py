@@ -13,7 +13,7 @@ from aerial_model.terrain import Terrain
 from aerial_sim import world
 from aerial_wbic.qp import ForceOptimization
 from aerial_wbic.target import shared_load
-from aerial_wbic.tasks import Arrangement, Limbs, command
+from aerial_wbic.tasks import Limbs, arrangement_block
 
 TOLERANCE = 1e-6  # relative to the largest acceleration
 PHYSICS_DT = 0.001  # [s]
@@ -39,15 +39,16 @@ def built(robot):
 
 
 @pytest.fixture
-def answer(robot, gains):
+def answer(robot, gains, commanded):
     """q̈, forces and torques of one tick that asks for a push, which one or two feet cannot give, with a tilted base."""
     optimization = ForceOptimization(robot, gains.weight_base, gains.weight_force)
-    limbs, arrangement = Limbs(robot), Arrangement.of(gains)
+    limbs, arrangement = Limbs(robot), arrangement_block(gains)
 
     def answer(state, target_at, contact):
         target = target_at(state, contact, com_acceleration=PUSH, orientation=np.array([0.0, 0.0, 0.0, 1.0]))
-        vdot_cmd, _ = command(state, target, limbs.joints(contact), arrangement)
-        solution = optimization.solve(state, vdot_cmd, shared_load(state, PUSH), contact)
+        vdot_cmd, _ = commanded(state, target, limbs.joints(contact), arrangement)
+        shared_load(state, PUSH, target.force)
+        solution = optimization.solve(state, vdot_cmd, target.force, contact)
         assert solution.solved
         return solution
 

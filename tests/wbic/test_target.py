@@ -7,7 +7,7 @@ import pytest
 
 from aerial_model import rotation
 from aerial_model.robot import BASE_ANGULAR
-from aerial_wbic.target import Fold, Hold, from_plan, shared_load, support_centre, supported
+from aerial_wbic.target import Fold, Following, Hold, shared_load, support_centre, supported
 
 GRAVITY = 9.81  # [m/s²]
 FORCE_TOLERANCE = 0.05  # [N], the regularization's part
@@ -31,7 +31,8 @@ def moments(state, force):
 @pytest.mark.parametrize("acceleration", [[0, 0, 0], [1.0, -0.5, 3.0], [0, 0, -9.0]])
 def test_the_load_is_shared_without_turning_the_body(robot, state_at, acceleration):
     state = state_at(moving=False)
-    force = shared_load(state, np.array(acceleration))
+    force = np.empty((4, 3))
+    shared_load(state, np.array(acceleration), force)
     total = robot.mass * (np.array(acceleration) + [0, 0, GRAVITY])
     np.testing.assert_allclose(force.sum(axis=0), total, atol=FORCE_TOLERANCE)
     np.testing.assert_allclose(moments(state, force), 0.0, atol=MOMENT_TOLERANCE)
@@ -40,7 +41,8 @@ def test_the_load_is_shared_without_turning_the_body(robot, state_at, accelerati
 
 def test_no_share_is_negative_when_the_body_leans_out(state_at):
     state = state_at(moving=False)
-    force = shared_load(state, np.array([8.0, 0.0, 0.0]))
+    force = np.empty((4, 3))
+    shared_load(state, np.array([8.0, 0.0, 0.0]), force)
     assert force[:, 2].min() >= 0
 
 
@@ -122,9 +124,19 @@ def test_a_fold_goes_from_the_joints_as_they_are_to_the_pose(robot, state_at):
 def test_a_plan_gives_its_sample_in_world_axes(hop, gains):
     turned = hop.placed(np.array([1.0, 2.0, 0.0]), 0.5)
     sample = turned.sample(0.3)
-    target = from_plan(sample, gains.follow)
+    target = Following(turned.track, gains.follow).at(0.3)
     R = rotation.matrix(sample.q[3:7])
     np.testing.assert_allclose(target.body.angular_velocity, R @ sample.v[BASE_ANGULAR])
     np.testing.assert_allclose(target.body.com, sample.com)
     np.testing.assert_array_equal(target.joint_position, sample.q[7:])
+    np.testing.assert_array_equal(target.force, sample.force)
+    assert target.body.gains == gains.follow
     assert target.contact.all()
+
+
+def test_who_waits_for_a_contact_keeps_the_joints_still(hop, gains):
+    following = Following(hop.track, gains.follow)
+    going, landing = following.at(0.3).joint_velocity.copy(), following.at(0.3, waiting=True)
+    assert going.any()
+    assert not landing.joint_velocity.any()
+    assert not landing.joint_acceleration.any()

@@ -37,6 +37,21 @@ def quaternion(a: np.ndarray) -> tuple:
     return a[0], a[1], a[2], a[3]
 
 
+ZERO = (0.0, 0.0, 0.0)
+
+
+@compiled
+def sum_of(a: tuple, b: tuple, scale: float) -> tuple:
+    """Return the components of a + scale · b."""
+    return a[0] + scale * b[0], a[1] + scale * b[1], a[2] + scale * b[2]
+
+
+@compiled
+def cross_of(a: tuple, b: tuple) -> tuple:
+    """Return the components of a × b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
 @compiled
 def inverse_of(q: tuple) -> tuple:
     """Return the components of the inverse of a unit quaternion."""
@@ -71,8 +86,10 @@ def lower_solve(L: np.ndarray, B: np.ndarray) -> None:
     m, k = B.shape
     for i in range(m):
         for j in range(i):
-            for c in range(k):
-                B[i, c] -= L[i, j] * B[j, c]
+            factor = L[i, j]
+            if factor != 0.0:
+                for c in range(k):
+                    B[i, c] -= factor * B[j, c]
         for c in range(k):
             B[i, c] /= L[i, i]
 
@@ -83,8 +100,10 @@ def upper_solve(L: np.ndarray, B: np.ndarray) -> None:
     m, k = B.shape
     for i in range(m - 1, -1, -1):
         for j in range(i + 1, m):
-            for c in range(k):
-                B[i, c] -= L[j, i] * B[j, c]
+            factor = L[j, i]
+            if factor != 0.0:
+                for c in range(k):
+                    B[i, c] -= factor * B[j, c]
         for c in range(k):
             B[i, c] /= L[i, i]
 

@@ -11,15 +11,24 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from aerial_model.compiled import compiled
-from aerial_model.robot import BASE_ANGULAR, BASE_LINEAR, BASE_ORIENTATION, BASE_POSITION, Robot
+from aerial_model.block import cut, cut_rows
+from aerial_model.compiled import ZERO, compiled, cross_of, sum_of
+from aerial_model.robot import (
+    BASE_ORIENTATION,
+    BASE_POSITION,
+    GRAVITY,
+    JOINT_VELOCITY,
+    Robot,
+)
+
+_N, _N_C, _MASS, _HEADER = range(4)  # where a block says how many joints and contact points there are, and the mass
 
 
 class Configuration(NamedTuple):
     """Quantities of a robot at one state, in W with Pinocchio's v (base twist in B, linear first).
 
     A tuple of arrays, so that compiled code takes it as it is and writes into it: to return arrays to Python takes it a
-    microsecond each.
+    microsecond each. All of them lie in one block.
     """
 
     q: np.ndarray  # (nq,)
@@ -27,7 +36,7 @@ class Configuration(NamedTuple):
     mass: float  # [kg]
     R_WB: np.ndarray  # base attitude (3, 3)
     M: np.ndarray  # mass matrix H (nv, nv), rotor inertia included
-    M_inv: np.ndarray  # H⁻¹ (nv, nv)
+    L: np.ndarray  # its factor, H = Lᵀ L, lower triangular (nv, nv): zero where H is
     nle: np.ndarray  # non-linear effects C q̇ + G (nv,)
     com: np.ndarray  # centre of mass r (3,) [m]
     com_velocity: np.ndarray  # ṙ (3,) [m/s]
@@ -38,6 +47,7 @@ class Configuration(NamedTuple):
     J_contacts: np.ndarray  # (n_c, 3, nv) with ċ_i = J_c,i q̇
     Jdot_v_contacts: np.ndarray  # J̇_c,i q̇ (n_c, 3) [m/s²]: the points' classical accelerations at q̈ = 0
     omega_contacts: np.ndarray  # angular velocities of the links the points are on (n_c, 3) [rad/s]
+    block: np.ndarray  # what all these arrays lie in
 
     @property
     def base_position(self) -> np.ndarray:
@@ -55,20 +65,61 @@ class Configuration(NamedTuple):
         return self.J_contacts @ self.v
 
 
+@compiled
+def configuration_in(block: np.ndarray) -> Configuration:
+    """Return the configuration that lies in a block."""
+    n, n_c = int(block[_N]), int(block[_N_C])
+    nq, nv = 7 + n, 6 + n
+    q, at = cut(block, _HEADER, nq)
+    v, at = cut(block, at, nv)
+    R_WB, at = cut_rows(block, at, 3, 3)
+    M, at = cut_rows(block, at, nv, nv)
+    L, at = cut_rows(block, at, nv, nv)
+    nle, at = cut(block, at, nv)
+    com, at = cut(block, at, 3)
+    com_velocity, at = cut(block, at, 3)
+    A_G, at = cut_rows(block, at, 6, nv)
+    Adot_v_G, at = cut(block, at, 6)
+    angular_momentum, at = cut(block, at, 3)
+    contact_positions, at = cut_rows(block, at, n_c, 3)
+    J_contacts, at = cut(block, at, n_c * 3 * nv)
+    Jdot_v_contacts, at = cut_rows(block, at, n_c, 3)
+    omega_contacts, at = cut_rows(block, at, n_c, 3)
+    return Configuration(
+        q,
+        v,
+        block[_MASS],
+        R_WB,
+        M,
+        L,
+        nle,
+        com,
+        com_velocity,
+        A_G,
+        Adot_v_G,
+        angular_momentum,
+        contact_positions,
+        J_contacts.reshape((n_c, 3, nv)),
+        Jdot_v_contacts,
+        omega_contacts,
+        block,
+    )
+
+
+def _size(n: int, n_c: int) -> int:
+    nq, nv = 7 + n, 6 + n
+    return _HEADER + nq + 2 * nv + 9 + 2 * nv**2 + 3 + 3 + 6 * nv + 6 + 3 + n_c * (3 + 3 * nv + 3 + 3)
+
+
 class Workspace(NamedTuple):
     """What a configuration is read from: mostly Pinocchio's own memory, because to look it up anew takes longer."""
 
     R_WB: np.ndarray  # (3, 3)
     M: np.ndarray  # upper triangle (nv, nv)
-    M_inv: np.ndarray  # upper triangle (nv, nv)
     nle: np.ndarray  # (nv,)
     com: np.ndarray  # (3,)
-    com_velocity: np.ndarray  # (3,)
     A_G: np.ndarray  # linear rows first (6, nv)
-    Adot_G: np.ndarray  # the same
-    angular_momentum: np.ndarray  # (3,)
     J: np.ndarray  # of every joint's spatial velocity at W's origin, linear rows first (6, nv)
-    Jdot: np.ndarray  # the same
     contacts: np.ndarray  # centres of the contact spheres (n_c, 3)
     moving: np.ndarray  # which points which velocities move (n_c, nv) bool
 
@@ -86,20 +137,9 @@ class Kinematics:
             for joint in list(model.supports[model.frames[frame].parentJoint])[1:]:  # 0: the universe
                 first = model.joints[joint].idx_v
                 moving[i, first : first + model.joints[joint].nv] = True
+        contacts = np.array(self._contacts)
         self._workspace = Workspace(
-            data.oMi[1].rotation,
-            data.M,
-            data.Minv,
-            data.nle,
-            data.com[0],
-            data.vcom[0],
-            data.Ag,
-            data.dAg,
-            data.hg.angular,
-            data.J,
-            data.dJ,
-            np.array(self._contacts),
-            moving,
+            data.oMi[1].rotation, data.M, data.nle, data.com[0], data.Ag, data.J, contacts, moving
         )
 
     def at(self, q: np.ndarray, v: np.ndarray) -> Configuration:
@@ -112,33 +152,16 @@ class Kinematics:
 
     def blank(self) -> Configuration:
         """Return the memory of a configuration."""
-        nq, nv, n_c = self.robot.model.nq, self.robot.model.nv, self.robot.n_contacts
-        shapes = {
-            "q": nq,
-            "v": nv,
-            "R_WB": (3, 3),
-            "M": (nv, nv),
-            "M_inv": (nv, nv),
-            "nle": nv,
-            "com": 3,
-            "com_velocity": 3,
-            "A_G": (6, nv),
-            "Adot_v_G": 6,
-            "angular_momentum": 3,
-            "contact_positions": (n_c, 3),
-            "J_contacts": (n_c, 3, nv),
-            "Jdot_v_contacts": (n_c, 3),
-            "omega_contacts": (n_c, 3),
-        }
-        return Configuration(mass=self.robot.mass, **{name: np.zeros(shape) for name, shape in shapes.items()})
+        n, n_c = self.robot.n_joints, self.robot.n_contacts
+        block = np.zeros(_size(n, n_c))
+        block[:_HEADER] = n, n_c, self.robot.mass
+        return configuration_in(block)
 
     def computed(self, q: np.ndarray, v: np.ndarray) -> Workspace:
         """Return what ``fill`` needs to know about a robot at ``q`` and ``v``; the next call overwrites it."""
         model, data = self.robot.model, self._data
-        pin.computeMinverse(model, data, q)
-        pin.crba(model, data, q)
+        pin.crba(model, data, q, pin.Convention.WORLD)  # also J, A_G and the centre of mass
         pin.nonLinearEffects(model, data, q, v)
-        pin.dccrba(model, data, q, v)
         pin.updateFramePlacements(model, data)
         for i, centre in enumerate(self._contacts):
             self._workspace.contacts[i] = centre
@@ -148,51 +171,98 @@ class Kinematics:
 @compiled
 def fill(state: Configuration, workspace: Workspace) -> None:
     """Write into a configuration all that follows from its q and v, for which the workspace was computed."""
-    contacts, moving, v = workspace.contacts, workspace.moving, state.v
-    nv, n_c = len(v), len(contacts)
+    nv = len(state.v)
     for i in range(nv):
+        state.nle[i] = workspace.nle[i]
         for j in range(i, nv):
             state.M[i, j] = state.M[j, i] = workspace.M[i, j]
-            state.M_inv[i, j] = state.M_inv[j, i] = workspace.M_inv[i, j]
-    state.R_WB[:] = workspace.R_WB
-    state.nle[:] = workspace.nle
-    state.com[:] = workspace.com
-    state.com_velocity[:] = workspace.com_velocity
-    state.angular_momentum[:] = workspace.angular_momentum
-    state.contact_positions[:] = contacts
+    for i in range(3):
+        state.com[i] = workspace.com[i]
+        for j in range(3):
+            state.R_WB[i, j] = workspace.R_WB[i, j]
+    factorize(state.M, state.L)
+    _fill_momentum(state, workspace.A_G)
+    _fill_contacts(state, workspace)
+
+
+@compiled
+def factorize(M: np.ndarray, L: np.ndarray) -> None:
+    """Write the factor of a mass matrix ``(nv, nv)``, M = Lᵀ L, into L, lower triangular.
+
+    From the leaves of the kinematic tree to its root: what is zero in M, the entries of joints neither of which moves the
+    other, stays zero (R. Featherstone, Rigid Body Dynamics Algorithms, 2008, section 6.5).
+    """
+    nv = len(M)
+    for i in range(nv):
+        for j in range(nv):
+            L[i, j] = M[i, j] if j <= i else 0.0
+    for k in range(nv - 1, -1, -1):
+        pivot = np.sqrt(L[k, k])
+        for i in range(k):
+            L[k, i] /= pivot
+        L[k, k] = pivot
+        for i in range(k):
+            factor = L[k, i]
+            if factor != 0.0:
+                for j in range(i + 1):
+                    L[i, j] -= factor * L[k, j]
+
+
+@compiled
+def _fill_momentum(state: Configuration, A_G: np.ndarray) -> None:
+    """Momenta and their bias; Pinocchio has the linear rows of ``A_G`` first."""
+    A, bias, nle, mass = state.A_G, state.Adot_v_G, state.nle, state.mass
     for row in range(6):
-        other = (row + 3) % 6  # Pinocchio has linear rows first
-        state.Adot_v_G[row] = 0.0
-        for k in range(nv):
-            state.A_G[row, k] = workspace.A_G[other, k]
-            state.Adot_v_G[row] += workspace.Adot_G[other, k] * v[k]
-    J, bias, omega = state.J_contacts, state.Jdot_v_contacts, state.omega_contacts
+        momentum = 0.0
+        for k in range(len(state.v)):
+            A[row, k] = A_G[(row + 3) % 6, k]
+            momentum += A[row, k] * state.v[k]
+        if row < 3:
+            state.angular_momentum[row] = momentum
+        else:
+            state.com_velocity[row - 3] = momentum / mass
+    # The first rows of C q̇ + G are the wrench on the base, in its axes, that q̈ = 0 takes; with the weight it is the rate.
+    for i in range(3):
+        bias[i] = bias[3 + i] = 0.0
+        for k in range(3):
+            bias[i] += state.R_WB[i, k] * nle[3 + k]
+            bias[3 + i] += state.R_WB[i, k] * nle[k]
+    x, y, z = state.q[0] - state.com[0], state.q[1] - state.com[1], state.q[2] - state.com[2]
+    bias[0] += y * bias[5] - z * bias[4]
+    bias[1] += z * bias[3] - x * bias[5]
+    bias[2] += x * bias[4] - y * bias[3]
+    bias[5] -= mass * GRAVITY
+
+
+@compiled
+def _fill_contacts(state: Configuration, workspace: Workspace) -> None:
+    v, S, J = state.v, workspace.J, state.J_contacts
+    linear_B = angular_B = ZERO  # twist of the base at W's origin
+    for k in range(JOINT_VELOCITY.start):
+        linear_B = sum_of(linear_B, (S[0, k], S[1, k], S[2, k]), v[k])
+        angular_B = sum_of(angular_B, (S[3, k], S[4, k], S[5, k]), v[k])
     J[:] = 0.0
-    bias[:] = 0.0
-    omega[:] = 0.0
-    turn, turn_rate, velocity = np.empty(3), np.empty(3), np.empty(3)
-    for i in range(n_c):
-        c = contacts[i]
-        turn_rate[:] = 0.0
-        velocity[:] = 0.0
-        for k in range(nv):
-            if not moving[i, k]:
+    for i in range(len(workspace.contacts)):
+        c = (workspace.contacts[i, 0], workspace.contacts[i, 1], workspace.contacts[i, 2])
+        linear, angular = linear_B, angular_B  # twist of the link
+        rate = turn_rate = ZERO  # of that twist at q̈ = 0
+        for k in range(len(v)):
+            if not workspace.moving[i, k]:
                 continue
-            column, rate = workspace.J[:, k], workspace.Jdot[:, k]
-            turn[0] = column[4] * c[2] - column[5] * c[1]  # ω × c of this column
-            turn[1] = column[5] * c[0] - column[3] * c[2]
-            turn[2] = column[3] * c[1] - column[4] * c[0]
-            for axis in range(3):
-                J[i, axis, k] = column[axis] + turn[axis]
-                velocity[axis] += J[i, axis, k] * v[k]
-                omega[i, axis] += column[3 + axis] * v[k]
-                bias[i, axis] += rate[axis] * v[k]
-                turn_rate[axis] += rate[3 + axis] * v[k]
+            axis, turn = (S[0, k], S[1, k], S[2, k]), (S[3, k], S[4, k], S[5, k])
+            if k >= JOINT_VELOCITY.start:
+                # A column rests in the link that it moves: it changes with that link's twist. Those of the base cancel.
+                linear, angular = sum_of(linear, axis, v[k]), sum_of(angular, turn, v[k])
+                turn_rate = sum_of(turn_rate, cross_of(angular, turn), v[k])
+                rate = sum_of(sum_of(rate, cross_of(angular, axis), v[k]), cross_of(linear, turn), v[k])
+            J[i, 0, k], J[i, 1, k], J[i, 2, k] = sum_of(axis, cross_of(turn, c), 1.0)
         # ċ = v_O + ω × c has the rate v̇_O + ω̇ × c + ω × ċ.
-        w = omega[i]
-        bias[i, 0] += turn_rate[1] * c[2] - turn_rate[2] * c[1] + w[1] * velocity[2] - w[2] * velocity[1]
-        bias[i, 1] += turn_rate[2] * c[0] - turn_rate[0] * c[2] + w[2] * velocity[0] - w[0] * velocity[2]
-        bias[i, 2] += turn_rate[0] * c[1] - turn_rate[1] * c[0] + w[0] * velocity[1] - w[1] * velocity[0]
+        velocity = sum_of(linear, cross_of(angular, c), 1.0)
+        bias = sum_of(sum_of(rate, cross_of(turn_rate, c), 1.0), cross_of(angular, velocity), 1.0)
+        for k in range(3):
+            state.contact_positions[i, k] = c[k]
+            state.omega_contacts[i, k] = angular[k]
+            state.Jdot_v_contacts[i, k] = bias[k]
 
 
 @compiled
@@ -207,14 +277,18 @@ def carry(state: Configuration, position: np.ndarray, velocity: np.ndarray) -> N
         position: of the base ``(3,)`` [m] in W.
         velocity: of the base, V ``(3,)`` [m/s] in W.
     """
-    in_base = velocity @ state.R_WB
-    state.q[BASE_POSITION] = position
-    state.v[BASE_LINEAR] = in_base
-    state.com[:] += position
-    state.com_velocity[:] += velocity
-    state.contact_positions[:] += position
-    turning = np.cross(state.v[BASE_ANGULAR], in_base)
-    state.nle[:] += np.ascontiguousarray(state.M[:, BASE_LINEAR]) @ turning
-    gained = state.R_WB @ turning
-    state.Adot_v_G[3:] += state.mass * gained
-    state.Jdot_v_contacts[:] += gained
+    R, v = state.R_WB, state.v
+    for k in range(3):
+        state.q[k] = position[k]
+        v[k] = R[0, k] * velocity[0] + R[1, k] * velocity[1] + R[2, k] * velocity[2]
+        state.com[k] += position[k]
+        state.com_velocity[k] += velocity[k]
+    turning = cross_of((v[3], v[4], v[5]), (v[0], v[1], v[2]))
+    for i in range(len(v)):
+        state.nle[i] += state.M[i, 0] * turning[0] + state.M[i, 1] * turning[1] + state.M[i, 2] * turning[2]
+    for k in range(3):
+        gained = R[k, 0] * turning[0] + R[k, 1] * turning[1] + R[k, 2] * turning[2]
+        state.Adot_v_G[3 + k] += state.mass * gained
+        for i in range(len(state.contact_positions)):
+            state.contact_positions[i, k] += position[k]
+            state.Jdot_v_contacts[i, k] += gained

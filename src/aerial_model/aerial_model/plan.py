@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from aerial_model import rotation
+from aerial_model.compiled import compiled, exp_of, inverse_of, log_of, product_of, quaternion
 from aerial_model.errors import InvalidPlanError
 from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, JOINT_POSITION, Robot
 from aerial_model.terrain import Terrain
@@ -35,6 +36,56 @@ class Target(NamedTuple):
     vdot: np.ndarray  # (nv,) slope of v between the knots
     force: np.ndarray  # (n_c, 3) [N]
     contact: np.ndarray  # (n_c,) bool
+
+
+class Track(NamedTuple):
+    """A plan as it is sampled."""
+
+    knots: np.ndarray  # all that is interpolated (K, nq + nv + 9): q, v, ṙ's place and rate, α
+    slopes: np.ndarray  # their change over the interval that follows, per second (K - 1, nq + nv + 9)
+    time: np.ndarray  # (K,) [s]
+    force: np.ndarray  # (K, n_c, 3) [N]
+    contact: np.ndarray  # (K, n_c) bool
+
+    @classmethod
+    def still(cls, n: int, n_c: int) -> Track:
+        """Return a track of n joints and n_c contact points on which nothing moves."""
+        knots = np.zeros((2, 2 * n + 22))
+        return cls(knots, knots[1:].copy(), np.arange(2.0), np.zeros((2, n_c, 3)), np.zeros((2, n_c), dtype=bool))
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints."""
+        return (self.knots.shape[1] - 22) // 2  # of (7 + n) + (6 + n) + 9
+
+
+@compiled
+def sampled(track: Track, time: float) -> Target:
+    """Return a plan at ``time`` [s], held at its ends; states are interpolated between knots, forces held."""
+    knots, slopes = track.knots, track.slopes
+    k = min(max(np.searchsorted(track.time, time, side="right") - 1, 0), len(slopes) - 1)
+    s = min(max(time - track.time[k], 0.0), track.time[k + 1] - track.time[k])
+    row, slope = knots[k] + s * slopes[k], slopes[k].copy()
+    share = s / (track.time[k + 1] - track.time[k])
+    begin, end = quaternion(knots[k, BASE_ORIENTATION]), quaternion(knots[k + 1, BASE_ORIENTATION])
+    turn = log_of(product_of(inverse_of(begin), end))
+    orientation = product_of(begin, exp_of((share * turn[0], share * turn[1], share * turn[2])))
+    for i in range(4):
+        row[BASE_ORIENTATION.start + i] = orientation[i]
+    nq = (knots.shape[1] - 8) // 2  # of nq + (nq - 1) + 9
+    com, rest = 2 * nq - 1, 2 * nq + 2
+    return Target(
+        row[:nq],
+        row[nq:com],
+        row[com:rest],
+        row[rest : rest + 3],
+        slope[rest : rest + 3],
+        row[rest + 3 :],
+        slope[rest + 3 :],
+        slope[nq:com],
+        track.force[k].copy(),
+        track.contact[k].copy(),
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,46 +187,24 @@ class Plan:
 
     def sample(self, time: float) -> Target:
         """Return the plan at ``time`` [s], held at its ends; states are interpolated between knots, forces held."""
-        k = self.interval(time)
-        begin, dt = self._intervals[k]
-        s = min(max((time - begin) / dt, 0.0), 1.0)
-        knots, slopes = self._rows
-        row, slope = knots[k] + (s * dt) * slopes[k], slopes[k]
-        nq, nv = self.q.shape[1], self.v.shape[1]
-        com, rest = nq + nv, nq + nv + 3
-        q = row[:nq]
-        q[BASE_ORIENTATION] = rotation.slerp(self.q[k, BASE_ORIENTATION], self.q[k + 1, BASE_ORIENTATION], s)
-        return Target(
-            q=q,
-            v=row[nq:com],
-            com=row[com:rest],
-            com_velocity=row[rest : rest + 3],
-            com_acceleration=slope[rest : rest + 3],
-            angular_momentum=row[rest + 3 :],
-            angular_momentum_rate=slope[rest + 3 :],
-            vdot=slope[nq:com],
-            force=self.force[k],
-            contact=self.contact[k],
-        )
+        return sampled(self.track, time)
 
     def interval(self, time: float) -> int:
         """Return the number k of the interval [t_k, t_k+1) that ``time`` [s] is in; before the first and after the last: these."""
-        return min(max(bisect_right(self._begins, time) - 1, 0), len(self._intervals) - 1)
-
-    @cached_property
-    def _intervals(self) -> list[tuple[float, float]]:
-        """Begin and duration of every interval [s]."""
-        return list(zip(self.time[:-1].tolist(), np.diff(self.time).tolist(), strict=True))
+        return min(max(bisect_right(self._begins, time) - 1, 0), len(self._begins) - 1)
 
     @cached_property
     def _begins(self) -> list[float]:
-        return [begin for begin, _ in self._intervals]
+        return self.time[:-1].tolist()
 
     @cached_property
-    def _rows(self) -> tuple[np.ndarray, np.ndarray]:
-        """All that is interpolated, one row a knot, and its slope over the interval that follows."""
+    def track(self) -> Track:
+        """What is interpolated."""
         knots = np.hstack([self.q, self.v, self.com, self.com_velocity, self.angular_momentum])
-        return knots, np.diff(knots, axis=0) / np.diff(self.time)[:, None]
+        slopes = np.diff(knots, axis=0) / np.diff(self.time)[:, None]
+        # Compiled code takes arrays of one kind: writable, row by row, whoever made the plan.
+        held = (np.array(values, order="C") for values in (self.time, self.force, self.contact))
+        return Track(knots, slopes, *held)
 
     @property
     def landing_pose(self) -> np.ndarray:

@@ -15,9 +15,9 @@ import numpy as np
 from aerial_model import rotation
 from aerial_model.errors import RefusalCode, RefusalError
 from aerial_model.kinematics import Configuration, Kinematics
-from aerial_model.plan import Plan
+from aerial_model.plan import Plan, Track
 from aerial_model.posture import crouch_depth
-from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, JOINT_POSITION, Robot
+from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, GRAVITY, JOINT_POSITION, Robot
 from aerial_model.state import Command, Estimate, Measurement
 from aerial_wbic.acceptance import check_start
 from aerial_wbic.drive import Drive
@@ -26,8 +26,8 @@ from aerial_wbic.gains import ControllerGains, Touchdown
 from aerial_wbic.phase import FOLLOWING, Phase, Phases
 from aerial_wbic.qp import ForceOptimization
 from aerial_wbic.qp_solvers import SOLVERS
-from aerial_wbic.target import GRAVITY, Fold, PostureTarget, WholeBodyTarget
-from aerial_wbic.tasks import Arrangement, Limbs, attitude_error, command
+from aerial_wbic.target import Fold, Following, PostureTarget, WholeBodyTarget
+from aerial_wbic.tasks import Limbs, arrangement_block, attitude_error, command
 from aerial_wbic.touchdown import ContactSense
 
 _DEPTH_SHARE = 0.85  # of the depth to which legs can bend that a landing may use
@@ -63,7 +63,7 @@ class Controller:
         self.robot = robot
         self._gains = _within_reach(robot.section("controller", ControllerGains), robot)
         self._limbs = Limbs(robot)
-        self._arrangement = Arrangement.of(self._gains)
+        self._arrangement = arrangement_block(self._gains)
         gains = self._gains
         self._qp = ForceOptimization(robot, gains.weight_base, gains.weight_force, SOLVERS[gains.qp_solver])
         self._estimator = Estimator(robot, self._gains.estimator)
@@ -97,11 +97,10 @@ class Controller:
         if not isinstance(target, WholeBodyTarget):
             return self._drive.resting(target, measurement)
         vdot_cmd, v_ref = self._accelerations(state, target)
-        self._drive.off_stops(v_ref, measurement)
         wish = state, vdot_cmd, target.force, target.contact
         solution = self._qp.solve(*wish)
         self._fallback_ticks += not solution.solved
-        if target.contact.any() and self._drive.exceeds(solution.torque, v_ref, measurement):
+        if np.count_nonzero(target.contact) and self._drive.exceeds(solution.torque, v_ref, measurement):
             solution = self._qp.within(self._drive.room(v_ref, measurement), solution, *wish)
         return self._drive.command(solution.torque, v_ref, measurement)
 
@@ -186,7 +185,9 @@ class Controller:
 
     def _accelerations(self, state: Configuration, target: WholeBodyTarget) -> tuple[np.ndarray, np.ndarray]:
         """Return q̈_cmd and q̇_ref ``(nv,)`` of the tasks."""
-        return command(state, target, self._limbs.joints(target.contact), self._arrangement)
+        vdot, v_ref = np.empty(len(state.v)), np.empty(len(state.v))
+        command(state.block, target.block, self._limbs.joints(target.contact), self._arrangement, vdot, v_ref)
+        return vdot, v_ref
 
     def _rehearse(self) -> None:
         """Stand for two ticks, once without torque to spare, report and begin to fold the legs: all is compiled then."""
@@ -212,6 +213,7 @@ class Controller:
         for time in (0.0, 0.002):
             self._sense.update(time, state, joints)
         Fold(state, 0.0, rate=1.0, pose=joints).at(0.0, state)
+        Following(Track.still(self.robot.n_joints, self.robot.n_contacts), self._gains.follow).at(0.0)
 
     def _errors(self) -> dict[str, np.ndarray]:
         state, target = self._now

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aerial_model.actuator import ActuatorLaw
+from aerial_model.block import cut_rows
 from aerial_model.compiled import compiled, friction_of, torque_bounds_of, voltage_of
 from aerial_model.kinematics import Kinematics
 from aerial_model.robot import JOINT_POSITION, JOINT_VELOCITY, Robot
@@ -20,7 +20,7 @@ _TO_STOP = 0.01  # [s] in which no joint is to reach its stop
 
 
 class _Law(NamedTuple):
-    """What a tick needs of the actuator law, arrays ``(n,)``, and of the gains."""
+    """What a tick needs of the actuator law and of the gains, arrays ``(n,)``; all of it lies in one block."""
 
     torque_max: np.ndarray
     bus_voltage: np.ndarray
@@ -29,14 +29,29 @@ class _Law(NamedTuple):
     damping: np.ndarray
     dry_friction: np.ndarray
     joint_damping: np.ndarray  # [N·m·s/rad]
+    lower_stop: np.ndarray  # [rad]
+    upper_stop: np.ndarray  # [rad]
+    is_arm: np.ndarray  # 1 or 0: bears nothing
     stiction_speed: float  # [rad/s]
     share: float  # of the limits that may be asked for
 
-    @classmethod
-    def of(cls, law: ActuatorLaw, gains: ControllerGains, lightness: np.ndarray) -> _Law:
-        arrays = [np.array(getattr(law, name)) for name in cls._fields[:6]]
-        damping = gains.joint_damping * lightness
-        return cls(*arrays, damping, gains.stiction_speed, gains.actuator_share)
+
+def _law_block(robot: Robot, gains: ControllerGains, lightness: np.ndarray) -> np.ndarray:
+    model, n = robot.model, robot.n_joints
+    is_arm = np.zeros(n)
+    is_arm[robot.arms] = 1.0
+    rows = [np.array(getattr(robot.actuators, name)) for name in _Law._fields[:6]]
+    rows += [gains.joint_damping * lightness]
+    rows += [model.lowerPositionLimit[JOINT_POSITION], model.upperPositionLimit[JOINT_POSITION], is_arm]
+    return np.concatenate([[gains.stiction_speed, gains.actuator_share], *rows])
+
+
+@compiled
+def _law_in(block: np.ndarray) -> _Law:
+    rows, _ = cut_rows(block, 2, 10, (len(block) - 2) // 10)
+    return _Law(
+        rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6], rows[7], rows[8], rows[9], block[0], block[1]
+    )
 
 
 class Drive:
@@ -48,24 +63,17 @@ class Drive:
 
     def __init__(self, robot: Robot, gains: ControllerGains) -> None:
         lightness = _lightness(robot, gains.joint_damping)
-        self._law = _Law.of(robot.actuators, gains, lightness)
-        self._arms = robot.arms
-        self._legs = np.setdiff1d(np.arange(robot.n_joints), robot.arms)
+        self._law = _law_block(robot, gains, lightness)
         n = robot.n_joints
-        model = robot.model
-        self._stops = model.lowerPositionLimit[JOINT_POSITION].copy(), model.upperPositionLimit[JOINT_POSITION].copy()
         self._zeros = np.zeros(n)
+        self._joint_damping = gains.joint_damping * lightness
         self._posture_stiffness = gains.posture_stiffness * lightness
         self._stop_damping = gains.stop_damping * lightness
         self.saturated_ticks = 0
 
-    def off_stops(self, v_ref: np.ndarray, measurement: Measurement) -> None:
-        """Take from q̇_ref ``(nv,)`` what would run joints into their stops: there is no going on, only torque in vain."""
-        _off_stops(v_ref[JOINT_VELOCITY], measurement.joint_position, *self._stops)
-
     def exceeds(self, torque: np.ndarray, v_ref: np.ndarray, measurement: Measurement) -> bool:
         """Return whether a torque ``(n,)`` [N·m] of a joint that can bear load leaves its room; the rest as for ``room``."""
-        return _exceeds(torque, v_ref[JOINT_VELOCITY], measurement.joint_velocity, self._legs, self._law)
+        return _exceeds(torque, v_ref, measurement.joint_position, measurement.joint_velocity, self._law)
 
     def command(self, torque: np.ndarray, v_ref: np.ndarray, measurement: Measurement) -> Command:
         """Return the command for the torques that the equations of motion ask for.
@@ -79,8 +87,8 @@ class Drive:
             v_ref: q̇_ref ``(nv,)``; of the tasks, not measured, so that friction is overcome also from rest.
             measurement: that is answered.
         """
-        velocity = v_ref[JOINT_VELOCITY]
-        torque, saturated = _torque(torque, velocity, measurement.joint_velocity, self._arms, self._law)
+        torque, velocity = torque.copy(), np.empty(len(torque))
+        saturated = _driven(torque, velocity, v_ref, measurement.joint_position, measurement.joint_velocity, self._law)
         if saturated < 0:
             return self.resting(None, measurement)
         self.saturated_ticks += saturated
@@ -89,7 +97,7 @@ class Drive:
             position=measurement.joint_position,
             velocity=velocity,
             stiffness=self._zeros,
-            damping=self._law.joint_damping,
+            damping=self._joint_damping,
             state_time=measurement.time,
             state_sequence=measurement.sequence,
         )
@@ -101,7 +109,10 @@ class Drive:
             v_ref: q̇_ref ``(nv,)``.
             measurement: that is answered.
         """
-        return _room(v_ref[JOINT_VELOCITY], measurement.joint_velocity, self._law)
+        n = len(measurement.joint_position)
+        room = Room(np.empty(n), np.empty(n))
+        _write_room(room, v_ref, measurement.joint_position, measurement.joint_velocity, self._law)
+        return room
 
     def resting(self, posture: PostureTarget | None, measurement: Measurement) -> Command:
         """Return the command of a robot that does not stand: joints go to a posture, or only resist motion."""
@@ -124,61 +135,79 @@ def _lightness(robot: Robot, damping: float) -> np.ndarray:
     if damping == 0.0:
         return np.ones(robot.n_joints)
     state = Kinematics(robot).at(robot.standing_configuration(), np.zeros(robot.model.nv))
-    inertia = 1.0 / np.diag(state.M_inv)[JOINT_VELOCITY]  # with all others free [kg·m²]
+    inertia = 1.0 / np.diag(np.linalg.inv(state.M))[JOINT_VELOCITY]  # with all others free [kg·m²]
     return np.minimum(1.0, _FASTEST * inertia / damping)
 
 
 @compiled
-def _off_stops(velocity: np.ndarray, position: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> None:
-    for j in range(len(velocity)):
-        slowest, fastest = (lower[j] - position[j]) / _TO_STOP, (upper[j] - position[j]) / _TO_STOP
-        velocity[j] = max(min(velocity[j], max(fastest, 0.0)), min(slowest, 0.0))
+def _off_stop(law: _Law, j: int, v_ref: np.ndarray, position: float) -> float:
+    """Return what of a joint's q̇_ref does not run it into its stop: there is no going on, only torque in vain."""
+    slowest, fastest = (law.lower_stop[j] - position) / _TO_STOP, (law.upper_stop[j] - position) / _TO_STOP
+    return max(min(v_ref[JOINT_VELOCITY.start + j], max(fastest, 0.0)), min(slowest, 0.0))
 
 
 @compiled
-def _room(velocity: np.ndarray, measured_velocity: np.ndarray, law: _Law) -> Room:
-    """Return the torques that keep a share of the limits, less what rides along with them."""
+def _room_of(law: _Law, j: int, velocity: float, measured_velocity: float) -> tuple[float, float]:
+    """Return the torques that keep a share of a joint's limits, less what rides along with them."""
     least, greatest = torque_bounds_of(
         measured_velocity,
-        law.share * law.torque_max,
-        law.share * law.bus_voltage,
-        law.volts_per_torque,
-        law.volts_per_speed,
+        law.share * law.torque_max[j],
+        law.share * law.bus_voltage[j],
+        law.volts_per_torque[j],
+        law.volts_per_speed[j],
     )
-    along = friction_of(velocity, law.damping, law.dry_friction, law.stiction_speed)
-    along += law.joint_damping * (velocity - measured_velocity)
-    return Room(least - along, greatest - along)
+    along = friction_of(velocity, law.damping[j], law.dry_friction[j], law.stiction_speed)
+    along += law.joint_damping[j] * (velocity - measured_velocity)
+    return least - along, greatest - along
+
+
+@compiled
+def _write_room(
+    room: Room, v_ref: np.ndarray, position: np.ndarray, measured_velocity: np.ndarray, law_block: np.ndarray
+) -> None:
+    law = _law_in(law_block)
+    for j in range(len(position)):
+        velocity = _off_stop(law, j, v_ref, position[j])
+        room.least[j], room.greatest[j] = _room_of(law, j, velocity, measured_velocity[j])
 
 
 @compiled
 def _exceeds(
-    torque: np.ndarray, velocity: np.ndarray, measured_velocity: np.ndarray, legs: np.ndarray, law: _Law
+    torque: np.ndarray, v_ref: np.ndarray, position: np.ndarray, measured_velocity: np.ndarray, law_block: np.ndarray
 ) -> bool:
-    room = _room(velocity, measured_velocity, law)
-    beyond = (torque < room.least) | (torque > room.greatest)
-    return bool(np.any(beyond[legs]))
+    law = _law_in(law_block)
+    for j in range(len(torque)):
+        if law.is_arm[j] == 0.0:
+            least, greatest = _room_of(law, j, _off_stop(law, j, v_ref, position[j]), measured_velocity[j])
+            if torque[j] < least or torque[j] > greatest:
+                return True
+    return False
 
 
 @compiled
-def _torque(
-    torque: np.ndarray, velocity: np.ndarray, measured_velocity: np.ndarray, arms: np.ndarray, law: _Law
-) -> tuple[np.ndarray, int]:
-    """Return the feed-forward torques ``(n,)`` [N·m], and whether the boards will be asked for too much: 1, 0.
+def _driven(
+    torque: np.ndarray,
+    velocity: np.ndarray,
+    v_ref: np.ndarray,
+    position: np.ndarray,
+    measured_velocity: np.ndarray,
+    law_block: np.ndarray,
+) -> int:
+    """Make torques ``(n,)`` [N·m] those to feed forward, and write the velocities that go with them.
 
-    It is −1 if a torque is not finite.
+    Return whether the boards will be asked for too much: 1, 0; −1 if a torque is not finite.
     """
-    torque = torque.copy()
-    if len(arms) > 0:
-        room = _room(velocity, measured_velocity, law)
-        for j in arms:
-            torque[j] = min(max(torque[j], room.least[j]), room.greatest[j])
-    torque += friction_of(velocity, law.damping, law.dry_friction, law.stiction_speed)
-    requested = torque + law.joint_damping * (velocity - measured_velocity)
-    voltage = voltage_of(requested, measured_velocity, law.volts_per_torque, law.volts_per_speed)
-    saturated = 0
+    law, saturated = _law_in(law_block), 0
     for j in range(len(torque)):
+        velocity[j] = _off_stop(law, j, v_ref, position[j])
+        if law.is_arm[j] != 0.0:
+            least, greatest = _room_of(law, j, velocity[j], measured_velocity[j])
+            torque[j] = min(max(torque[j], least), greatest)
+        torque[j] += friction_of(velocity[j], law.damping[j], law.dry_friction[j], law.stiction_speed)
         if not np.isfinite(torque[j]):
-            return torque, -1
-        if abs(requested[j]) > law.torque_max[j] or abs(voltage[j]) > law.bus_voltage[j]:
+            return -1
+        requested = torque[j] + law.joint_damping[j] * (velocity[j] - measured_velocity[j])
+        voltage = voltage_of(requested, measured_velocity[j], law.volts_per_torque[j], law.volts_per_speed[j])
+        if abs(requested) > law.torque_max[j] or abs(voltage) > law.bus_voltage[j]:
             saturated = 1
-    return torque, saturated
+    return saturated

@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from aerial_model.block import cut, cut_rows
 from aerial_model.compiled import (
     cholesky,
     cholesky_solve,
@@ -32,19 +33,19 @@ from aerial_model.compiled import (
     quaternion,
     vector,
 )
-from aerial_model.kinematics import Configuration, Kinematics, Workspace, carry, fill
+from aerial_model.kinematics import Configuration, Kinematics, Workspace, carry, configuration_in, fill
 from aerial_model.robot import (
     BASE_ANGULAR,
     BASE_LINEAR,
     BASE_ORIENTATION,
     BASE_POSITION,
+    GRAVITY,
     JOINT_POSITION,
     JOINT_VELOCITY,
     Robot,
 )
 from aerial_model.state import Estimate, Measurement
 from aerial_wbic.gains import EstimatorNoise
-from aerial_wbic.target import GRAVITY
 
 P, V, FEET = 0, 1, 2  # rows of X; the contact points fill it from FEET on
 _INSTANT = 1e-3  # [s] less than a period
@@ -52,13 +53,26 @@ _GATE = 4.0  # squared disagreement, in variances, from which a point is believe
 
 
 class Belief(NamedTuple):
-    """What the filter believes; its arrays change in place."""
+    """What the filter believes; its arrays change in place. All of it lies in one block."""
 
     orientation: np.ndarray  # of B (4,)
     X: np.ndarray  # (2 + n_c, 3)
     P: np.ndarray  # (2 + n_c, 2 + n_c)
     roll: np.ndarray  # u_i of the loaded points, else zero (n_c, 3) [m/s]
     loaded_since: np.ndarray  # (n_c,) [s]
+    block: np.ndarray  # what all these arrays lie in
+
+
+@compiled
+def belief_in(block: np.ndarray) -> Belief:
+    """Return the belief that lies in a block, which begins with the number of contact points."""
+    n_c = int(block[0])
+    orientation, at = cut(block, 1, 4)
+    X, at = cut_rows(block, at, FEET + n_c, 3)
+    P_, at = cut_rows(block, at, FEET + n_c, FEET + n_c)
+    roll, at = cut_rows(block, at, n_c, 3)
+    loaded_since, at = cut(block, at, n_c)
+    return Belief(orientation, X, P_, roll, loaded_since, block)
 
 
 class Estimator:
@@ -95,9 +109,8 @@ class Estimator:
             self._belief = _nothing(measurement.orientation, len(self._radius))
         state = self._memory
         _predict(
-            self._belief,
-            state.q,
-            state.v,
+            self._belief.block,
+            state.block,
             measurement.time - self._time,
             self._gyro,
             measurement.angular_velocity,
@@ -113,7 +126,7 @@ class Estimator:
         self._time, self._gyro = measurement.time, measurement.angular_velocity
         if measurement.localization is not None:
             _correct_position(self._belief, measurement.localization, self._noise)
-        _correct(self._belief, state, workspace, self._radius, contact, measurement.time, self._noise)
+        _correct(self._belief.block, state.block, workspace, self._radius, contact, measurement.time, self._noise)
         self.state = state
         return Estimate(
             time=measurement.time,
@@ -138,20 +151,19 @@ class Estimator:
 
 def _nothing(orientation: np.ndarray, n_c: int) -> Belief:
     """Return the belief in an attitude ``(4,)`` and nothing else yet."""
-    return Belief(
-        orientation=np.array(orientation, dtype=float),
-        X=np.zeros((FEET + n_c, 3)),
-        P=np.zeros((FEET + n_c, FEET + n_c)),
-        roll=np.zeros((n_c, 3)),
-        loaded_since=np.full(n_c, -np.inf),  # a robot that is switched on stands firmly
-    )
+    rows = FEET + n_c
+    block = np.zeros(1 + 4 + 3 * rows + rows**2 + 3 * n_c + n_c)
+    block[0] = n_c
+    belief = belief_in(block)
+    belief.orientation[:] = orientation
+    belief.loaded_since[:] = -np.inf  # a robot that is switched on stands firmly
+    return belief
 
 
 @compiled
 def _predict(
-    belief: Belief,
-    q: np.ndarray,
-    v: np.ndarray,
+    belief_block: np.ndarray,
+    state_block: np.ndarray,
     dt: float,
     gyro_before: np.ndarray,
     gyro: np.ndarray,
@@ -163,8 +175,11 @@ def _predict(
 ) -> None:
     """Carry the belief on by ``dt`` [s]; ``reported`` is the inertial unit's attitude.
 
-    Write into q and v what the sensors and the believed attitude say, the base at the origin and linearly at rest.
+    Write into the robot's q and v what the sensors and the believed attitude say, the base at the origin and linearly at
+    rest.
     """
+    belief, state = belief_in(belief_block), configuration_in(state_block)
+    q, v = state.q, state.v
     half_turn = exp_of(vector((gyro_before + gyro) * (dt / 4)))
     midway = product_of(quaternion(belief.orientation), half_turn)
     # The accelerometer reports the mean over the interval: it acts at the attitude half-way.
@@ -198,8 +213,8 @@ def _draw(orientation: np.ndarray, towards: np.ndarray, share: float) -> None:
 
 @compiled
 def _correct(
-    belief: Belief,
-    state: Configuration,
+    belief_block: np.ndarray,
+    state_block: np.ndarray,
     workspace: Workspace,
     radius: np.ndarray,
     contact: np.ndarray,
@@ -207,9 +222,10 @@ def _correct(
     noise: EstimatorNoise,
 ) -> None:
     """Fill in the robot as seen from its base, let its loaded points measure; then move it to where it is believed to be."""
+    belief, state = belief_in(belief_block), configuration_in(state_block)
     fill(state, workspace)
     _correct_by_legs(belief, state, radius, contact, time, noise)
-    carry(state, belief.X[P].copy(), belief.X[V].copy())
+    carry(state, belief.X[P], belief.X[V])
 
 
 @compiled

@@ -66,6 +66,7 @@ class TaskWeights(NamedTuple):
 
     limbs: float = 1e4  # [1/(m/s²)²], [1/(rad/s²)²]
     base: float = 100.0  # [1/(m/s²)²], [1/(rad/s²)²]
+    spare_joints: float = 1.0  # [1/(rad/s²)²]
     angular_momentum: float = 1.0  # [1/(m/s²)²]
 
 

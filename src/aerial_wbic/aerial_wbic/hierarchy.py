@@ -2,10 +2,14 @@
 
 Next to it, for comparison, all tasks at once with weights.
 
-Null-space projection with dynamically consistent inverses, thesis (3.20)–(3.23). What is left of a task under those above
-it may have any rank, zero included. Two absolute thresholds tell what it is: a relative one would take the rounding noise
-of an exhausted J N for a task and make accelerations of 1e13. What is left but hardly moves (arms that hang straight
-down cannot turn a body about the vertical) is moved by a damped inverse: the less, the less it can do.
+Null-space projection with dynamically consistent inverses, thesis (3.20)–(3.23), in coordinates in which the mass matrix is
+the identity: with H = Lᵀ L and ẍ = J q̈ = (J L⁻¹) (L q̈), the dynamically consistent inverse is the ordinary one, and what a
+task owns is spanned by rows of length one, Q. The task below it is left with J L⁻¹ (1 − Qᵀ Q).
+
+What is left of a task under those above it may have any rank, zero included. Two absolute thresholds tell what it is: a
+relative one would take the rounding noise of an exhausted J N for a task and make accelerations of 1e13. What is left but
+hardly moves (arms that hang straight down cannot turn a body about the vertical) is moved by a damped inverse: the less, the
+less it can do.
 """
 
 from __future__ import annotations
@@ -14,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aerial_model.compiled import cholesky, cholesky_solve, compiled
+from aerial_model.compiled import cholesky, cholesky_solve, compiled, lower_solve, reordered
 
 # Eigenvalues of J H⁻¹ Jᵀ, inverse inertias [1/kg].
 MOVABLE = (
@@ -36,76 +40,175 @@ class Task(NamedTuple):
     xdot: np.ndarray  # ẋ_ref (m,)
 
 
+class Priorities(NamedTuple):
+    """What tasks so far ask for, and what they leave to those below; as they are made, nothing and all."""
+
+    L: np.ndarray  # lower triangular (nv, nv) with H = Lᵀ L
+    command: np.ndarray  # rows L q̈_cmd, L q̇_ref (2, nv)
+    Q: np.ndarray  # (nv, nv): its first rows span what tasks own
+
+
 @compiled
-def prioritized(M_inv: np.ndarray, tasks: tuple[Task, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Return q̈_cmd and q̇_ref ``(nv,)`` of tasks in falling priority, thesis (3.23), the same for both.
+def priorities(L: np.ndarray) -> Priorities:
+    """Return the memory of no task yet, for a robot with H = Lᵀ L."""
+    return Priorities(L, np.zeros((2, len(L))), np.empty_like(L))
+
+
+@compiled
+def subordinate(above: Priorities, owned: int, task: Task) -> int:
+    """Let a task use what those above it leave, thesis (3.23): all but the first ``owned`` rows of Q.
+
+    It may have no rows. Return how many rows are owned with it.
+    """
+    L, command, Q = above
+    m, nv = len(task.a), len(L)
+    if m == 0 or owned == nv:
+        return owned
+    rows = np.empty((m, nv + 2))
+    for i in range(m):
+        for k in range(nv):
+            rows[i, k] = task.J[i, k]
+    whiten(L, rows)
+    for i in range(m):
+        rows[i, nv], rows[i, nv + 1] = task.a[i], task.xdot[i]
+    _subtract_commanded(rows, command)
+    _project(rows, Q, owned)
+    rank = owned_rows(rows, MOVABLE / L[0, 0] ** 2)
+    for row in range(rank):
+        for k in range(nv):
+            command[0, k] += rows[row, k] * rows[row, nv]
+            command[1, k] += rows[row, k] * rows[row, nv + 1]
+    rank = min(rank, nv - owned)
+    for row in range(rank):
+        for k in range(nv):
+            Q[owned + row, k] = rows[row, k]
+    return owned + rank
+
+
+@compiled
+def decided(tasks: Priorities, vdot: np.ndarray, v_ref: np.ndarray) -> None:
+    """Write q̈_cmd and q̇_ref ``(nv,)`` of tasks in falling priority, the same for both.
 
     Of those that do equally well they are the ones of least kinetic energy, the least in the metric of H.
-
-    Args:
-        M_inv: H⁻¹ ``(nv, nv)``.
-        tasks: the first is the most important; a task of no rows is allowed.
     """
-    nv = len(M_inv)
-    command = np.zeros((nv, 2))  # columns q̈_cmd, q̇_ref
-    N = np.eye(nv)  # projects on what the tasks so far leave free
-    free = nv  # dimensions of that
-    for task in tasks:
-        if len(task.a) > 0 and free > 0:
-            J_pre = task.J @ N
-            J_bar, J_bar_owned, rank = consistent_inverses(J_pre, M_inv)
-            gap = np.empty((len(task.a), 2))
-            gap[:, 0], gap[:, 1] = task.a, task.xdot
-            command += J_bar @ (gap - task.J @ command)
-            free -= rank
-            N -= J_bar_owned @ J_pre
-    return command[:, 0].copy(), command[:, 1].copy()
+    L = tasks.L
+    for i in range(len(vdot)):
+        vdot[i], v_ref[i] = tasks.command[0, i], tasks.command[1, i]
+        for j in range(i):
+            if L[i, j] != 0.0:
+                vdot[i] -= L[i, j] * vdot[j]
+                v_ref[i] -= L[i, j] * v_ref[j]
+        vdot[i] /= L[i, i]
+        v_ref[i] /= L[i, i]
+
+
+class Compromise(NamedTuple):
+    """Normal equations of tasks that compete: min Σ w_i ‖J_i q̈ − a_i‖² + ε q̈ᵀ H q̈, the same for q̇_ref."""
+
+    A: np.ndarray  # (nv, nv)
+    b: np.ndarray  # columns of q̈_cmd, q̇_ref (nv, 2)
 
 
 @compiled
-def weighted(M: np.ndarray, tasks: tuple[Task, ...], weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return q̈_cmd and q̇_ref ``(nv,)`` of tasks that compete: min Σ w_i ‖J_i q̈ − a_i‖² + ε q̈ᵀ H q̈, the same for q̇_ref.
-
-    Args:
-        M: H ``(nv, nv)``.
-        tasks: a task of no rows is allowed.
-        weights: w_i, one a task.
-    """
-    A = EFFORT * M
-    b = np.zeros((len(M), 2))  # columns q̈_cmd, q̇_ref
-    for i, task in enumerate(tasks):
-        Jt = weights[i] * task.J.T
-        A += Jt @ task.J
-        b[:, 0] += Jt @ task.a
-        b[:, 1] += Jt @ task.xdot
-    L = np.empty_like(A)
-    cholesky(A, L)
-    cholesky_solve(L, b)
-    return b[:, 0].copy(), b[:, 1].copy()
+def compromise(M: np.ndarray) -> Compromise:
+    """Return the equations of no task yet, for a robot with mass matrix H ``(nv, nv)``."""
+    return Compromise(EFFORT * M, np.zeros((len(M), 2)))
 
 
 @compiled
-def consistent_inverses(J: np.ndarray, M_inv: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """Return J^dyn = H⁻¹ Jᵀ (J H⁻¹ Jᵀ)⁺ ``(nv, m)``, thesis (3.20), of what can be moved and of all that J owns.
+def weigh_in(equations: Compromise, task: Task, weight: float) -> None:
+    """Let a task compete with the others; it may have no rows."""
+    Jt = weight * task.J.T
+    equations.A[:] += Jt @ task.J
+    equations.b[:, 0] += Jt @ task.a
+    equations.b[:, 1] += Jt @ task.xdot
 
-    The third is the number of directions J ``(m, nv)`` owns. As a rule all can be moved and both are the same.
+
+@compiled
+def agreed(equations: Compromise, vdot: np.ndarray, v_ref: np.ndarray) -> None:
+    """Write q̈_cmd and q̇_ref ``(nv,)`` of tasks that compete."""
+    L = np.empty_like(equations.A)
+    cholesky(equations.A, L)
+    cholesky_solve(L, equations.b)
+    vdot[:], v_ref[:] = equations.b[:, 0], equations.b[:, 1]
+
+
+@compiled
+def whiten(L: np.ndarray, J: np.ndarray) -> None:
+    """Replace the first nv columns of J ``(m, nv or more)`` by J L⁻¹, with L lower triangular ``(nv, nv)``."""
+    for i in range(len(J)):
+        for k in range(len(L) - 1, -1, -1):
+            if J[i, k] != 0.0:
+                J[i, k] /= L[k, k]
+                factor = J[i, k]
+                for c in range(k):
+                    J[i, c] -= factor * L[k, c]
+
+
+@reordered
+def _subtract_commanded(rows: np.ndarray, command: np.ndarray) -> None:
+    """Take from what rows are to do, their last two numbers, what is commanded already."""
+    nv = command.shape[1]
+    for i in range(len(rows)):
+        acceleration = velocity = 0.0
+        for k in range(nv):
+            acceleration += rows[i, k] * command[0, k]
+            velocity += rows[i, k] * command[1, k]
+        rows[i, nv] -= acceleration
+        rows[i, nv + 1] -= velocity
+
+
+@reordered
+def _project(rows: np.ndarray, Q: np.ndarray, owned: int) -> None:
+    """Take from rows ``(m, nv or more)`` what lies in the span of the first rows of Q ``(nv, nv)``, which are orthonormal."""
+    nv = len(Q)
+    for i in range(len(rows)):
+        for row in range(owned):
+            along = 0.0
+            for k in range(nv):
+                along += rows[i, k] * Q[row, k]
+            for k in range(nv):
+                rows[i, k] -= along * Q[row, k]
+
+
+@reordered
+def gram(J: np.ndarray, nv: int, A: np.ndarray) -> None:
+    """Write J Jᵀ into A ``(m, m)``, of the first nv columns."""
+    for i in range(len(J)):
+        for j in range(i + 1):
+            inner = 0.0
+            for k in range(nv):
+                inner += J[i, k] * J[j, k]
+            A[i, j] = A[j, i] = inner
+
+
+@compiled
+def owned_rows(rows: np.ndarray, enough: float) -> int:
+    """Replace rows by ones of length one that span them, and what they are to do by what these are to do.
+
+    Args:
+        rows: ``(m, nv + 2)``, in coordinates in which the mass matrix is the identity; the last two numbers are what a row
+            is to do. Only the first are left, as many as are returned.
+        enough: inverse inertia [1/kg] from which on a direction does all of what it is asked for, nearly.
+
+    Returns:
+        The number of directions owned. As a rule it is m, and all can be moved.
     """
-    J_M_inv = J @ M_inv
-    A = J_M_inv @ J.T
-    L = np.empty_like(A)
-    enough = MOVABLE * M_inv[0, 0]
+    m, nv = len(rows), rows.shape[1] - 2
+    A, L = np.empty((m, m)), np.empty((m, m))
+    gram(rows, nv, A)
     if cholesky(A, L) > _CERTAIN * enough:  # every row adds to those before
-        cholesky_solve(L, J_M_inv)
-        J_bar = np.ascontiguousarray(J_M_inv.T)
-        return J_bar, J_bar, len(A)
+        lower_solve(L, rows)
+        return m
     eigenvalues, U = np.linalg.eigh(A)
-    M_inv_Jt_U = J_M_inv.T @ np.ascontiguousarray(U)
-    movable, owned = np.zeros((2, len(A)))
+    turned = np.ascontiguousarray(U.T) @ rows
     rank = 0
     for i, eigenvalue in enumerate(eigenvalues):
         if eigenvalue > NOISE:
-            owned[i] = 1 / eigenvalue
+            root = np.sqrt(eigenvalue)
+            for k in range(nv):
+                rows[rank, k] = turned[i, k] / root
+            for k in range(nv, nv + 2):
+                rows[rank, k] = turned[i, k] * root * eigenvalue / (eigenvalue**2 + enough**2)
             rank += 1
-            movable[i] = eigenvalue / (eigenvalue**2 + enough**2)
-    Ut = np.ascontiguousarray(U.T)
-    return (M_inv_Jt_U * movable) @ Ut, (M_inv_Jt_U * owned) @ Ut, rank
+    return rank

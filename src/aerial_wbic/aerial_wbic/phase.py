@@ -17,7 +17,7 @@ from aerial_model.kinematics import Configuration
 from aerial_model.plan import Plan
 from aerial_model.robot import Robot
 from aerial_wbic.gains import ControllerGains, Touchdown
-from aerial_wbic.target import Fold, Hold, PostureTarget, WholeBodyTarget, from_plan, waiting
+from aerial_wbic.target import Fold, Following, Hold, PostureTarget, WholeBodyTarget
 
 
 class Phase(IntEnum):
@@ -82,6 +82,7 @@ class Phases:
     def follow(self, plan: Plan) -> None:
         """Follow ``plan``, expressed in W, from the next tick on."""
         self.plan, self._plan_begin = plan, None
+        self._following = Following(plan.track, self._gains.follow)
         self.phase = Phase.TAKE_OFF
 
     def abort(self) -> None:
@@ -158,8 +159,8 @@ class Phases:
     def target(self, state: Configuration) -> WholeBodyTarget | PostureTarget | None:
         """Return what to do now, seen where the robot is; None: nothing but to damp the joints."""
         if self.phase in FOLLOWING:
-            target = from_plan(self.plan.sample(min(self._plan_time, self.plan.landing_time)), self._gains.follow)
-            return target if self._plan_time <= self.plan.landing_time + _INSTANT else waiting(target)
+            landing, time = self.plan.landing_time, self._plan_time
+            return self._following.at(min(time, landing), waiting=time > landing + _INSTANT)
         if self._next_way is not None:
             self._way, self._next_way = self._next_way(state), None
         if isinstance(self._way, Hold) and state.R_WB[2, 2] < self._upright_min:

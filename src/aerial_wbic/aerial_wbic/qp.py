@@ -20,10 +20,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
-from aerial_model.compiled import cholesky, cholesky_solve, compiled, invert
+from aerial_model.block import cut, cut_rows
+from aerial_model.compiled import cholesky, cholesky_solve, compiled, invert, lower_solve
 from aerial_model.contact import friction_pyramid
-from aerial_model.kinematics import Configuration
-from aerial_model.robot import BASE_TWIST, JOINT_VELOCITY, Robot
+from aerial_model.kinematics import Configuration, configuration_in
+from aerial_model.robot import JOINT_VELOCITY, Robot
+from aerial_wbic.hierarchy import gram, whiten
 from aerial_wbic.qp_solvers import INFINITY, N_BASE, Osqp, QpFactory
 
 _HELD = 1e-6  # [1/kg] below it no joint holds a direction of a point: straight legs, points of one foot
@@ -47,10 +49,36 @@ class Room(NamedTuple):
 
 
 class GiveWay(NamedTuple):
-    """How the robot gives way where the commanded accelerations and the forces do not fit."""
+    """How the robot gives way where the commanded accelerations and the forces do not fit; both lie in one block."""
 
     E: np.ndarray  # (nv, 6) accelerations with that of the base, loaded points at rest
     inverse: np.ndarray  # (S_fb H E)⁻¹ (6, 6): the base's acceleration for a wrench that is missing
+
+
+@compiled
+def give_way_in(block: np.ndarray) -> GiveWay:
+    """Return what lies in a block ``((nv + 6) · 6,)``."""
+    nv = len(block) // N_BASE - N_BASE
+    E, at = cut_rows(block, 0, nv, N_BASE)
+    inverse, at = cut_rows(block, at, N_BASE, N_BASE)
+    return GiveWay(E, inverse)
+
+
+class _Answer(NamedTuple):
+    """Where a solution is written; all of it lies in one block."""
+
+    vdot: np.ndarray  # as of Solution
+    force: np.ndarray
+    torque: np.ndarray
+
+
+@compiled
+def _answer_in(block: np.ndarray, nv: int) -> _Answer:
+    n = nv - N_BASE
+    vdot, at = cut(block, 0, nv)
+    torque, at = cut(block, at, n)
+    force, at = cut_rows(block, at, (len(block) - at) // 3, 3)
+    return _Answer(vdot, force, torque)
 
 
 class ForceOptimization:
@@ -71,10 +99,13 @@ class ForceOptimization:
         self._friction = float(pyramid[0, 2])
         self._root_force = float(np.sqrt(weight_force))
         # Of this tick; written in place.
-        self._give = GiveWay(np.zeros((robot.model.nv, N_BASE)), np.zeros((N_BASE, N_BASE)))
+        nv = robot.model.nv
+        self._give = np.zeros((nv + N_BASE) * N_BASE)
+        answers = [np.zeros(nv + robot.n_joints + 3 * robot.n_contacts) for _ in range(2)]
+        self._free, self._limited_answer = ((block, _answer_in(block, nv)) for block in answers)
 
     def solve(self, state: Configuration, vdot_cmd: np.ndarray, f_cmd: np.ndarray, contact: np.ndarray) -> Solution:
-        """Return the forces and the acceleration of (3.24).
+        """Return the forces and the acceleration of (3.24), which hold until the next are asked for.
 
         When the solver fails, the one fallback is: the commanded forces, moved into the friction pyramid.
 
@@ -86,7 +117,7 @@ class ForceOptimization:
         """
         n = np.count_nonzero(contact)
         df = self._programs[n - 1].solve(state, vdot_cmd, f_cmd, contact, self._give) if n else _NO_FORCE
-        return self._solution(state, vdot_cmd, f_cmd, contact, df)
+        return self._solution(self._free, state, vdot_cmd, f_cmd, contact, df)
 
     def within(
         self,
@@ -104,18 +135,25 @@ class ForceOptimization:
         """
         program = self._limited[np.count_nonzero(contact) - 1]
         df = program.solve(state, vdot_cmd, f_cmd, contact, self._give, room)
-        limited = self._solution(state, vdot_cmd, f_cmd, contact, df)
+        limited = self._solution(self._limited_answer, state, vdot_cmd, f_cmd, contact, df)
         return limited._replace(solved=solution.solved) if limited.solved else solution
 
     def _solution(
-        self, state: Configuration, vdot_cmd: np.ndarray, f_cmd: np.ndarray, contact: np.ndarray, df: np.ndarray | None
+        self,
+        memory: tuple[np.ndarray, _Answer],
+        state: Configuration,
+        vdot_cmd: np.ndarray,
+        f_cmd: np.ndarray,
+        contact: np.ndarray,
+        df: np.ndarray | None,
     ) -> Solution:
         """Return what follows from the optimum; with None, or what is not finite, the fallback."""
-        found = _NO_FORCE if df is None else df
-        solved = df is not None
-        return Solution(
-            *_outcome(state, vdot_cmd, f_cmd, contact, self._give, found, solved, self._root_force, self._friction)
+        block, answer = memory
+        found, solved = (_NO_FORCE, False) if df is None else (df, True)
+        solved = _answer(
+            state.block, vdot_cmd, f_cmd, contact, self._give, found, solved, self._root_force, self._friction, block
         )
+        return Solution(answer.vdot, answer.force, answer.torque, solved)
 
 
 _NO_FORCE = np.zeros(0)
@@ -154,33 +192,44 @@ class _Program:
         vdot_cmd: np.ndarray,
         f_cmd: np.ndarray,
         contact: np.ndarray,
-        give: GiveWay,
+        give: np.ndarray,
         room: Room | None = None,
     ) -> np.ndarray | None:
         """Return √Q_2 δ_f ``(3 n,)`` of the loaded points, or None; ``room`` for one with limits, the rest as of the whole."""
         root_base, root_force = self._root_base, self._root_force
         A, lower, upper = self._A.data, self._lower, self._upper
         _state_problem(
-            state, vdot_cmd, f_cmd, contact, give, self._pyramid, root_base, root_force, self._changing, A, lower, upper
+            state.block,
+            vdot_cmd,
+            f_cmd,
+            contact,
+            give,
+            root_base,
+            root_force,
+            self._changing,
+            self._pyramid,
+            A,
+            lower,
+            upper,
         )
         if room is not None:
             _state_limits(
-                state, vdot_cmd, f_cmd, contact, give, room, root_base, root_force, self._limits, A, lower, upper
+                state.block, vdot_cmd, f_cmd, contact, give, room, root_base, root_force, self._limits, A, lower, upper
             )
         return self._solver.minimum(self._A, lower, upper)
 
 
 @compiled
 def _state_problem(
-    state: Configuration,
+    state_block: np.ndarray,
     vdot_cmd: np.ndarray,
     f_cmd: np.ndarray,
     contact: np.ndarray,
-    give: GiveWay,
-    pyramid: np.ndarray,
+    give_block: np.ndarray,
     root_base: float,
     root_force: float,
     changing: np.ndarray,
+    pyramid: np.ndarray,
     A: np.ndarray,
     lower: np.ndarray,
     upper: np.ndarray,
@@ -189,30 +238,38 @@ def _state_problem(
 
     The rows of the equations of motion say √Q_1 δ_q = √Q_1 (S_fb H E)⁻¹ (S_fb J_cᵀ δ_f + what f_cmd leaves missing).
     """
+    state, give = configuration_in(state_block), give_way_in(give_block)
     give_way(state, contact, give)
-    loaded = np.flatnonzero(contact)
-    columns = np.empty((N_BASE, 3 * len(loaded) + 1))
-    for n, i in enumerate(loaded):
-        columns[:, 3 * n : 3 * n + 3] = state.J_contacts[i, :, :N_BASE].T
-    columns[:, -1] = _missing(state, vdot_cmd, f_cmd, contact)
-    columns = give.inverse @ columns
-    for column in range(len(changing)):
-        for row in range(N_BASE):
-            A[changing[column, row]] = -root_base / root_force * columns[row, column]
-    lower[:N_BASE] = upper[:N_BASE] = root_base * columns[:, -1]
-    rows = len(pyramid)
-    for n, i in enumerate(loaded):
-        begin = N_BASE + n * rows
-        lower[begin : begin + rows] = -(pyramid @ f_cmd[i])
+    missing = _missing(state, vdot_cmd, f_cmd, contact)
+    for row in range(N_BASE):
+        given = 0.0
+        for k in range(N_BASE):
+            given += give.inverse[row, k] * missing[k]
+        lower[row] = upper[row] = root_base * given
+    scale = -root_base / root_force
+    n, rows = 0, len(pyramid)
+    for i in range(len(contact)):
+        if not contact[i]:
+            continue
+        for axis in range(3):
+            for row in range(N_BASE):
+                given = 0.0
+                for k in range(N_BASE):
+                    given += give.inverse[row, k] * state.J_contacts[i, axis, k]
+                A[changing[3 * n + axis, row]] = scale * given
+        for row in range(rows):
+            inside = pyramid[row, 0] * f_cmd[i, 0] + pyramid[row, 1] * f_cmd[i, 1] + pyramid[row, 2] * f_cmd[i, 2]
+            lower[N_BASE + n * rows + row] = -inside
+        n += 1
 
 
 @compiled
 def _state_limits(
-    state: Configuration,
+    state_block: np.ndarray,
     vdot_cmd: np.ndarray,
     f_cmd: np.ndarray,
     contact: np.ndarray,
-    give: GiveWay,
+    give_block: np.ndarray,
     room: Room,
     root_base: float,
     root_force: float,
@@ -225,6 +282,7 @@ def _state_limits(
 
     They say least ≤ τ_cmd + H_j E δ_q − J_jᵀ δ_f ≤ greatest, the bounds moved apart to admit the torques without force.
     """
+    state, give = configuration_in(state_block), give_way_in(give_block)
     loaded = np.flatnonzero(contact)
     n_joints = limits.shape[1]
     begin = len(lower) - n_joints
@@ -233,7 +291,8 @@ def _state_limits(
     free = give.inverse @ _missing(state, vdot_cmd, force, contact)
     for i in loaded:
         force[i] = f_cmd[i]
-    torque_cmd = _inverse_dynamics(state, vdot_cmd, force)
+    torque_cmd = np.empty(n_joints)
+    _inverse_dynamics(state, vdot_cmd, force, torque_cmd)
     for j in range(n_joints):
         row = JOINT_VELOCITY.start + j
         without = state.M[row] @ vdot_cmd + state.nle[row]
@@ -254,85 +313,131 @@ def _state_limits(
 
 
 @compiled
-def _inverse_dynamics(state: Configuration, vdot: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Return the joint torques ``(n,)`` [N·m], the joint rows of H q̈ + C q̇ + G − Σ J_c,iᵀ f_i, thesis (2.2)."""
-    torque = state.M[JOINT_VELOCITY] @ vdot + state.nle[JOINT_VELOCITY]
-    for i in range(len(force)):
-        for k in range(3):
-            torque -= force[i, k] * state.J_contacts[i, k, JOINT_VELOCITY]
-    return torque
+def _inverse_dynamics(state: Configuration, vdot: np.ndarray, force: np.ndarray, torque: np.ndarray) -> None:
+    """Write the joint torques ``(n,)`` [N·m], the joint rows of H q̈ + C q̇ + G − Σ J_c,iᵀ f_i, thesis (2.2)."""
+    for j in range(len(torque)):
+        row = JOINT_VELOCITY.start + j
+        torque[j] = state.nle[row]
+        for k in range(len(vdot)):
+            torque[j] += state.M[row, k] * vdot[k]
+        for i in range(len(force)):
+            for axis in range(3):
+                torque[j] -= force[i, axis] * state.J_contacts[i, axis, row]
 
 
 @compiled
-def _outcome(
-    state: Configuration,
+def _answer(
+    state_block: np.ndarray,
     vdot_cmd: np.ndarray,
     f_cmd: np.ndarray,
     contact: np.ndarray,
-    give: GiveWay,
+    give_block: np.ndarray,
     df: np.ndarray,
     solved: bool,
     root_force: float,
     friction: float,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
-    """Return q̈ ``(nv,)``, f_r ``(n_c, 3)``, τ ``(n,)``, and whether they follow from √Q_2 δ_f, which is ``df``.
+    answer_block: np.ndarray,
+) -> bool:
+    """Write q̈, f_r and τ; return whether they follow from √Q_2 δ_f, which is ``df``.
 
     How the robot gives way follows from the forces: the equations of motion hold to rounding.
     """
-    force = np.zeros_like(f_cmd)
+    state, give = configuration_in(state_block), give_way_in(give_block)
+    answer = _answer_in(answer_block, len(vdot_cmd))
+    vdot, force = answer.vdot, answer.force
     for k in range(len(df)):
         solved = solved and np.isfinite(df[k])
-    for n, i in enumerate(np.flatnonzero(contact)):
-        if solved:
-            force[i] = f_cmd[i] + df[3 * n : 3 * n + 3] / root_force
+    n = 0
+    for i in range(len(contact)):
+        if not contact[i]:
+            force[i] = 0.0
+        elif solved:
+            for axis in range(3):
+                force[i, axis] = f_cmd[i, axis] + df[3 * n + axis] / root_force
         else:
             normal = max(f_cmd[i, 2], 0.0)
             side = friction * normal
             force[i, 0] = min(max(f_cmd[i, 0], -side), side)
             force[i, 1] = min(max(f_cmd[i, 1], -side), side)
             force[i, 2] = normal
-    if not contact.any():
+        n += contact[i]
+    if n == 0:
         give_way(state, contact, give)
-    vdot = vdot_cmd + give.E @ (give.inverse @ _missing(state, vdot_cmd, force, contact))
-    return vdot, force, _inverse_dynamics(state, vdot, force), solved
+    missing = _missing(state, vdot_cmd, force, contact)
+    for i in range(len(vdot)):
+        vdot[i] = vdot_cmd[i]
+    for c in range(N_BASE):
+        given = 0.0
+        for k in range(N_BASE):
+            given += give.inverse[c, k] * missing[k]
+        for i in range(len(vdot)):
+            vdot[i] += give.E[i, c] * given
+    _inverse_dynamics(state, vdot, force, answer.torque)
+    return solved
 
 
 @compiled
 def give_way(state: Configuration, contact: np.ndarray, give: GiveWay) -> None:
     """Write how the robot gives way while the points of ``contact`` ``(n_c,)`` bool stay at rest.
 
-    The joints' part of E is −H_jj⁻¹ J_jᵀ (J_j H_jj⁻¹ J_jᵀ)⁻¹ J_b; without contact it is zero.
+    The joints' part of E is −H_jj⁻¹ J_jᵀ (J_j H_jj⁻¹ J_jᵀ)⁻¹ J_b; without contact it is zero. With H = Lᵀ L it is
+    H_jj = L_jjᵀ L_jj, and of T = J_j L_jj⁻¹ that part is −L_jj⁻¹ Tᵀ (T Tᵀ)⁻¹ J_b.
     """
-    E = give.E
-    E[:] = 0.0
-    for k in range(N_BASE):
-        E[k, k] = 1.0
-    loaded = np.flatnonzero(contact)
-    if len(loaded) > 0:
-        rows, n = 3 * len(loaded), len(E) - N_BASE
-        J_b, J_j = np.empty((rows, N_BASE)), np.empty((rows, n))
-        for i, point in enumerate(loaded):
-            J_b[3 * i : 3 * i + 3] = state.J_contacts[point, :, BASE_TWIST]
-            J_j[3 * i : 3 * i + 3] = state.J_contacts[point, :, JOINT_VELOCITY]
-        L = np.empty((n, n))
-        cholesky(state.M[JOINT_VELOCITY, JOINT_VELOCITY], L)
-        moved = np.ascontiguousarray(J_j.T)
-        cholesky_solve(L, moved)
-        A = J_j @ moved
+    E, L, first = give.E, state.L, JOINT_VELOCITY.start
+    n, rows = len(E) - first, 3 * np.count_nonzero(contact)
+    for i in range(len(E)):
+        for c in range(N_BASE):
+            E[i, c] = 1.0 if i == c else 0.0
+    if rows > 0:
+        J_b, T = np.empty((rows, N_BASE)), np.empty((rows, n))
+        row = 0
+        for i in range(len(contact)):
+            if contact[i]:
+                for axis in range(3):
+                    for c in range(N_BASE):
+                        J_b[row, c] = state.J_contacts[i, axis, c]
+                    for j in range(n):
+                        T[row, j] = state.J_contacts[i, axis, first + j]
+                    row += 1
+        L_jj = np.empty((n, n))
+        for i in range(n):
+            for j in range(i + 1):
+                L_jj[i, j] = L[first + i, first + j]
+        whiten(L_jj, T)
+        A = np.empty((rows, rows))
+        gram(T, n, A)
         for k in range(rows):
             A[k, k] += _HELD
-        L = np.empty_like(A)
-        cholesky(A, L)
-        cholesky_solve(L, J_b)
-        E[JOINT_VELOCITY] = -(moved @ J_b)
-    invert(np.ascontiguousarray(state.M[BASE_TWIST]) @ E, give.inverse)
+        cholesky(A, A)
+        cholesky_solve(A, J_b)
+        moved = np.zeros((n, N_BASE))
+        for row in range(rows):
+            for j in range(n):
+                if T[row, j] != 0.0:
+                    for c in range(N_BASE):
+                        moved[j, c] -= T[row, j] * J_b[row, c]
+        lower_solve(L_jj, moved)
+        for j in range(n):
+            for c in range(N_BASE):
+                E[first + j, c] = moved[j, c]
+    weight = np.zeros((N_BASE, N_BASE))
+    for i in range(N_BASE):
+        for k in range(len(E)):
+            for c in range(N_BASE):
+                weight[i, c] += state.M[i, k] * E[k, c]
+    invert(weight, give.inverse)
 
 
 @compiled
 def _missing(state: Configuration, vdot_cmd: np.ndarray, force: np.ndarray, contact: np.ndarray) -> np.ndarray:
     """Return S_fb (J_cᵀ f − H q̈_cmd − C q̇ − G) ``(6,)`` with the forces of the loaded points."""
-    wrench = -(state.M[BASE_TWIST] @ vdot_cmd) - state.nle[BASE_TWIST]
-    for i in np.flatnonzero(contact):
-        for k in range(3):
-            wrench += force[i, k] * state.J_contacts[i, k, BASE_TWIST]
+    wrench = np.empty(N_BASE)
+    for row in range(N_BASE):
+        wrench[row] = -state.nle[row]
+        for k in range(len(vdot_cmd)):
+            wrench[row] -= state.M[row, k] * vdot_cmd[k]
+        for i in range(len(contact)):
+            if contact[i]:
+                for axis in range(3):
+                    wrench[row] += force[i, axis] * state.J_contacts[i, axis, row]
     return wrench

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aerial_model import plan as plans
 from aerial_model import rotation
+from aerial_model.block import cut, cut_flags, cut_rows, flags_size
 from aerial_model.compiled import (
     cholesky,
     cholesky_solve,
@@ -18,16 +18,17 @@ from aerial_model.compiled import (
     exp_of,
     inverse_of,
     log_of,
+    matrix_of,
     product_of,
     quaternion,
     vector,
 )
-from aerial_model.kinematics import Configuration
-from aerial_model.robot import BASE_ANGULAR, BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY
-from aerial_wbic.gains import BodyGains
-from aerial_wbic.settling import REACH, TIME, Settling, settled, settling
+from aerial_model.kinematics import Configuration, configuration_in
+from aerial_model.plan import Track, sampled
+from aerial_model.robot import BASE_ANGULAR, BASE_ORIENTATION, GRAVITY, JOINT_POSITION, JOINT_VELOCITY
+from aerial_wbic.gains import BodyGains, Feedback
+from aerial_wbic.settling import REACH, TIME, settled, settling
 
-GRAVITY = 9.81  # [m/s²]
 _SUPPORT_SHARE = 0.8  # of the support's extent that the resultant force may use
 _VERTICAL = 1e-6  # horizontal part of the base's x axis below which it has no heading
 REST_TOLERANCE = 0.2  # of the height at rest: farther off, something keeps the robot from standing
@@ -47,7 +48,7 @@ class BodyTarget(NamedTuple):
 
 
 class WholeBodyTarget(NamedTuple):
-    """Everything the hierarchy and the optimization follow in one tick."""
+    """Everything the hierarchy and the optimization follow in one tick; all arrays lie in one block."""
 
     body: BodyTarget
     joint_position: np.ndarray  # (n,) [rad]
@@ -57,6 +58,52 @@ class WholeBodyTarget(NamedTuple):
     angular_momentum_rate: np.ndarray  # (3,) [N·m]
     force: np.ndarray  # f_cmd (n_c, 3) in W [N]
     contact: np.ndarray  # (n_c,) bool
+    block: np.ndarray  # what all these arrays lie in
+
+
+_N, _N_C, _GAINS, _HEADER = 0, 1, 2, 6  # where a block says how many joints and points there are, and the body's gains
+
+
+def blank_target(n: int, n_c: int, gains: BodyGains) -> WholeBodyTarget:
+    """Return the memory of a target for n joints and n_c contact points, none of which carries load."""
+    block = np.zeros(_HEADER + 19 + 3 * n + 6 + 3 * n_c + flags_size(n_c))
+    block[:_HEADER] = n, n_c, *gains.position, *gains.attitude
+    return target_in(block)
+
+
+@compiled
+def target_in(block: np.ndarray) -> WholeBodyTarget:
+    """Return the target that lies in a block."""
+    n, n_c = int(block[_N]), int(block[_N_C])
+    com, at = cut(block, _HEADER, 3)
+    com_velocity, at = cut(block, at, 3)
+    com_acceleration, at = cut(block, at, 3)
+    orientation, at = cut(block, at, 4)
+    angular_velocity, at = cut(block, at, 3)
+    angular_acceleration, at = cut(block, at, 3)
+    joint_position, at = cut(block, at, n)
+    joint_velocity, at = cut(block, at, n)
+    joint_acceleration, at = cut(block, at, n)
+    angular_momentum, at = cut(block, at, 3)
+    angular_momentum_rate, at = cut(block, at, 3)
+    force, at = cut_rows(block, at, n_c, 3)
+    contact, at = cut_flags(block, at, n_c)
+    gains = BodyGains(
+        Feedback(block[_GAINS], block[_GAINS + 1]),
+        Feedback(block[_GAINS + 2], block[_GAINS + 3]),
+    )
+    body = BodyTarget(com, com_velocity, com_acceleration, orientation, angular_velocity, angular_acceleration, gains)
+    return WholeBodyTarget(
+        body,
+        joint_position,
+        joint_velocity,
+        joint_acceleration,
+        angular_momentum,
+        angular_momentum_rate,
+        force,
+        contact,
+        block,
+    )
 
 
 class PostureTarget(NamedTuple):
@@ -66,34 +113,49 @@ class PostureTarget(NamedTuple):
     joint_velocity: np.ndarray  # (n,) [rad/s]
 
 
-def from_plan(sample: plans.Target, gains: BodyGains) -> WholeBodyTarget:
-    """Return the target that follows a plan's sample, expressed in W."""
-    R = rotation.matrix(sample.q[BASE_ORIENTATION])
-    body = BodyTarget(
-        com=sample.com,
-        com_velocity=sample.com_velocity,
-        com_acceleration=sample.com_acceleration,
-        orientation=sample.q[BASE_ORIENTATION],
-        angular_velocity=R @ sample.v[BASE_ANGULAR],
-        angular_acceleration=R @ sample.vdot[BASE_ANGULAR],
-        gains=gains,
-    )
-    return WholeBodyTarget(
-        body=body,
-        joint_position=sample.q[JOINT_POSITION],
-        joint_velocity=sample.v[JOINT_VELOCITY],
-        joint_acceleration=sample.vdot[JOINT_VELOCITY],
-        angular_momentum=sample.angular_momentum,
-        angular_momentum_rate=sample.angular_momentum_rate,
-        force=sample.force.copy(),  # whoever made the plan: compiled code takes writable arrays only
-        contact=sample.contact.copy(),
-    )
+class Following:
+    """Follows a plan.
+
+    Args:
+        track: of the plan, in W.
+        gains: of the base task.
+    """
+
+    def __init__(self, track: Track, gains: BodyGains) -> None:
+        self._track = track
+        self._target = blank_target(track.n_joints, track.contact.shape[1], gains)
+
+    def at(self, time: float, *, waiting: bool = False) -> WholeBodyTarget:
+        """Return the target at ``time`` [s] since the plan began; it holds until the next.
+
+        Args:
+            time: since the plan began [s].
+            waiting: for a contact, in the landing pose: the joints are at rest.
+        """
+        _followed(self._track, time, waiting, self._target.block)
+        return self._target
 
 
-def waiting(target: WholeBodyTarget) -> WholeBodyTarget:
-    """Return a target with the joints at rest where it has them: for who waits in the landing pose for a contact."""
-    still = np.zeros_like(target.joint_velocity)
-    return target._replace(joint_velocity=still, joint_acceleration=still.copy())
+@compiled
+def _followed(track: Track, time: float, waiting: bool, block: np.ndarray) -> None:
+    target = target_in(block)
+    sample, body = sampled(track, time), target.body
+    R = matrix_of(quaternion(sample.q[BASE_ORIENTATION]))
+    omega, omega_rate = vector(sample.v[BASE_ANGULAR]), vector(sample.vdot[BASE_ANGULAR])
+    for i in range(3):
+        body.com[i], body.com_velocity[i] = sample.com[i], sample.com_velocity[i]
+        body.com_acceleration[i] = sample.com_acceleration[i]
+        body.angular_velocity[i] = R[i][0] * omega[0] + R[i][1] * omega[1] + R[i][2] * omega[2]
+        body.angular_acceleration[i] = R[i][0] * omega_rate[0] + R[i][1] * omega_rate[1] + R[i][2] * omega_rate[2]
+    body.orientation[:] = sample.q[BASE_ORIENTATION]
+    target.joint_position[:] = sample.q[JOINT_POSITION]
+    moving = 0.0 if waiting else 1.0
+    target.joint_velocity[:] = moving * sample.v[JOINT_VELOCITY]
+    target.joint_acceleration[:] = moving * sample.vdot[JOINT_VELOCITY]
+    target.angular_momentum[:] = sample.angular_momentum
+    target.angular_momentum_rate[:] = sample.angular_momentum_rate
+    target.force[:] = sample.force
+    target.contact[:] = sample.contact
 
 
 class Hold:
@@ -137,15 +199,19 @@ class Hold:
         tilt = rotation.log(rotation.multiply(state.base_orientation, rotation.conjugate(level)))
         spin = state.R_WB @ state.v[BASE_ANGULAR]
         low = np.array([0.0, 0.0, offset[2] - com_height])  # by which it is below where it is to stand
-        self._course = _Course(
-            begin=time,
-            offset=settling(offset - low, velocity, self._rest, max(rate, REACH * abs(velocity[2]) / depth)),
-            rise=settling(low, np.zeros(3), np.zeros(3), rate),
-            tilt=settling(tilt, spin, np.zeros(3), max(rate, REACH * float(np.linalg.norm(spin)) / turn)),
-            level=level,
-            joints=settling(state.q[JOINT_POSITION], state.v[JOINT_VELOCITY], pose, rate),
+        depth_rate = max(rate, REACH * abs(velocity[2]) / depth)
+        turn_rate = max(rate, REACH * float(np.linalg.norm(spin)) / turn)
+        self._ways = np.hstack(
+            [
+                settling(offset - low, velocity, self._rest, depth_rate),
+                settling(low, np.zeros(3), np.zeros(3), rate),
+                settling(tilt, spin, np.zeros(3), turn_rate),
+                settling(state.q[JOINT_POSITION], state.v[JOINT_VELOCITY], pose, rate),
+            ]
         )
-        self._target = _resting(len(state.v) - JOINT_VELOCITY.start, len(state.contact_positions), gains)
+        self._begin, self._level = time, level
+        self._target = blank_target(len(pose), len(state.contact_positions), gains)
+        self._target.contact[:] = True
         self.end = time + TIME / rate
 
     def reached(self, state: Configuration) -> bool:
@@ -154,55 +220,55 @@ class Hold:
 
     def at(self, time: float, state: Configuration) -> WholeBodyTarget:
         """Return the target at ``time`` [s] of a robot at ``state``; it holds until the next."""
-        _held(self._course, time, state, self._target)
+        _held(self._ways, self._level, time - self._begin, state.block, self._target.block)
         return self._target
 
 
-class _Course(NamedTuple):
-    """The way to rest: of the centre of mass from the centre of the support, of the attitude from ``level``, of the joints."""
-
-    begin: float  # [s]
-    offset: Settling  # [m]
-    rise: Settling  # to the height to stand at, besides [m]
-    tilt: Settling  # rotation vector in W [rad]
-    level: np.ndarray  # (4,)
-    joints: Settling  # [rad]
-
-
-def _resting(n: int, n_c: int, gains: BodyGains) -> WholeBodyTarget:
-    """Return the memory of a target with every contact point on the ground and n joints that do not move."""
-    body = BodyTarget(*(np.zeros(size) for size in (3, 3, 3, 4, 3, 3)), gains)
-    joints = [np.zeros(n) for _ in range(3)]
-    return WholeBodyTarget(body, *joints, np.zeros(3), np.zeros(3), np.zeros((n_c, 3)), np.ones(n_c, dtype=bool))
+_OFFSET, _RISE, _TILT, _JOINTS = 0, 3, 6, 9  # where in the ways to rest of a hold each begins
+# The centre of mass's from the centre of the support and its rise besides, both [m], the rotation vector from the level
+# attitude in W [rad], the joints' [rad].
 
 
 @compiled
-def _held(course: _Course, time: float, state: Configuration, target: WholeBodyTarget) -> None:
-    body = target.body
+def _held(ways: np.ndarray, level: np.ndarray, time: float, state_block: np.ndarray, target_block: np.ndarray) -> None:
+    state, target = configuration_in(state_block), target_in(target_block)
+    body, now = target.body, settled(ways, time)
     position, attitude = body.gains
-    offset, velocity, acceleration = settled(course.offset, time - course.begin)
-    rise, rise_velocity, rise_acceleration = settled(course.rise, time - course.begin)
-    body.com[:] = support_centre(state) + offset + rise
-    body.com_velocity[:] = velocity + rise_velocity
-    acceleration += rise_acceleration
-    # The base task adds its feedback to this acceleration; the sum is what the support can give.
-    feedback = position.stiffness * (body.com - state.com) + position.damping * (body.com_velocity - state.com_velocity)
-    total = supported(state, acceleration + feedback)
-    body.com_acceleration[:] = total - feedback
-    tilt, body.angular_velocity[:], body.angular_acceleration[:] = settled(course.tilt, time - course.begin)
-    orientation = product_of(exp_of(vector(tilt)), quaternion(course.level))
-    body.orientation[:] = orientation
+    centre, acceleration, feedback = support_centre(state), np.empty(3), np.empty(3)
+    for k in range(3):
+        body.com[k] = centre[k] + now[0, _OFFSET + k] + now[0, _RISE + k]
+        body.com_velocity[k] = now[1, _OFFSET + k] + now[1, _RISE + k]
+        # The base task adds its feedback to this acceleration; the sum is what the support can give.
+        feedback[k] = position.stiffness * (body.com[k] - state.com[k])
+        feedback[k] += position.damping * (body.com_velocity[k] - state.com_velocity[k])
+        acceleration[k] = now[2, _OFFSET + k] + now[2, _RISE + k] + feedback[k]
+    total = supported(state, acceleration)
+    shared_load(state, total, target.force)
+    orientation = product_of(exp_of((now[0, _TILT], now[0, _TILT + 1], now[0, _TILT + 2])), quaternion(level))
+    turn = log_of(product_of(orientation, inverse_of(quaternion(state.q[BASE_ORIENTATION]))))
+    omega, turning = np.zeros(3), np.empty(3)
+    for k in range(3):
+        body.com_acceleration[k] = total[k] - feedback[k]
+        body.angular_velocity[k], body.angular_acceleration[k] = now[1, _TILT + k], now[2, _TILT + k]
+        for i in range(3):
+            omega[k] += state.R_WB[k, i] * state.v[BASE_ANGULAR.start + i]
+        turning[k] = body.angular_acceleration[k]
+        turning[k] += attitude.damping * (body.angular_velocity[k] - omega[k]) + attitude.stiffness * turn[k]
+    for k in range(4):
+        body.orientation[k] = orientation[k]
     # The robot turns as one: of the angular momentum only that of joints moving beside the base is to go away.
-    inertia = np.ascontiguousarray(state.A_G[:3, BASE_ANGULAR]) @ state.R_WB.T  # with joints locked, about W's axes
-    omega = state.R_WB @ state.v[BASE_ANGULAR]
-    turn = np.array(log_of(product_of(orientation, inverse_of(quaternion(state.q[BASE_ORIENTATION])))))
-    turning = attitude.damping * (body.angular_velocity - omega) + attitude.stiffness * turn
-    target.angular_momentum[:] = inertia @ omega
-    target.angular_momentum_rate[:] = inertia @ (body.angular_acceleration + turning)
-    target.joint_position[:], target.joint_velocity[:], target.joint_acceleration[:] = settled(
-        course.joints, time - course.begin
-    )
-    target.force[:] = shared_load(state, total)
+    for i in range(3):
+        target.angular_momentum[i] = target.angular_momentum_rate[i] = 0.0
+        for j in range(3):
+            inertia = 0.0  # with joints locked, about W's axes
+            for k in range(3):
+                inertia += state.A_G[i, BASE_ANGULAR.start + k] * state.R_WB[j, k]
+            target.angular_momentum[i] += inertia * omega[j]
+            target.angular_momentum_rate[i] += inertia * turning[j]
+    for j in range(len(target.joint_position)):
+        target.joint_position[j] = now[0, _JOINTS + j]
+        target.joint_velocity[j] = now[1, _JOINTS + j]
+        target.joint_acceleration[j] = now[2, _JOINTS + j]
 
 
 class Fold:
@@ -229,7 +295,11 @@ class Fold:
 @compiled
 def support_centre(state: Configuration) -> np.ndarray:
     """Return the mean of the contact spheres' centres ``(3,)`` [m] in W."""
-    return state.contact_positions.sum(axis=0) / len(state.contact_positions)
+    n_c, centre = len(state.contact_positions), np.zeros(3)
+    for i in range(n_c):
+        for k in range(3):
+            centre[k] += state.contact_positions[i, k] / n_c
+    return centre
 
 
 @compiled
@@ -239,42 +309,56 @@ def supported(state: Configuration, acceleration: np.ndarray) -> np.ndarray:
     The line of the force through the centre of mass meets the ground within a part of the rectangle, along the heading,
     that the contact points span; the rest is for moments. What is asked for beyond that would roll the feet over.
     """
+    points, com, R = state.contact_positions, state.com, state.R_WB
     F = acceleration[2] + GRAVITY
-    arms = state.contact_positions - state.com  # (n_c, 3)
-    height = -arms[:, 2].mean()
-    if F <= 0 or height <= 0:
-        return acceleration
-    ahead = state.R_WB[:2, 0] / max(np.hypot(state.R_WB[0, 0], state.R_WB[1, 0]), _VERTICAL)
+    height = com[2] - support_centre(state)[2]
     result = acceleration.copy()
-    for axis in range(2):
-        direction = ahead if axis == 0 else np.array([-ahead[1], ahead[0]])
-        reach = np.ascontiguousarray(arms[:, :2]) @ direction
-        middle, half = (reach.max() + reach.min()) / 2, _SUPPORT_SHARE * (reach.max() - reach.min()) / 2
-        wanted = acceleration[:2] @ direction
+    if F <= 0 or height <= 0:
+        return result
+    level = max(np.hypot(R[0, 0], R[1, 0]), _VERTICAL)
+    ahead = R[0, 0] / level, R[1, 0] / level
+    for x, y in (ahead, (-ahead[1], ahead[0])):
+        least, most = np.inf, -np.inf
+        for i in range(len(points)):
+            reach = (points[i, 0] - com[0]) * x + (points[i, 1] - com[1]) * y
+            least, most = min(least, reach), max(most, reach)
+        middle, half = (most + least) / 2, _SUPPORT_SHARE * (most - least) / 2
+        wanted = acceleration[0] * x + acceleration[1] * y
         meets = -wanted * height / F  # from under the centre of mass, against the acceleration
         allowed = min(max(meets, middle - half), middle + half)
-        result[:2] += (-allowed * F / height - wanted) * direction
+        change = -allowed * F / height - wanted
+        result[0] += change * x
+        result[1] += change * y
     return result
 
 
 @compiled
-def shared_load(state: Configuration, com_acceleration: np.ndarray) -> np.ndarray:
-    """Return forces ``(n_c, 3)`` [N] in W that accelerate the centre of mass and do not turn the body.
+def shared_load(state: Configuration, com_acceleration: np.ndarray, force: np.ndarray) -> None:
+    """Write forces ``(n_c, 3)`` [N] in W that accelerate the centre of mass and do not turn the body.
 
     Every point takes a share w_i of the same force F = m (r̈ − g): Σ w_i = 1, and Σ w_i c_i lies where F through the
     centre of mass meets the height of the support. Of these shares it is the most even one; none is negative.
     """
-    F = state.mass * com_acceleration
-    F[2] += state.mass * GRAVITY
-    arms = state.contact_positions - state.com  # (n_c, 3)
-    A = np.ones((3, len(arms)))
-    A[1:] = arms[:, :2].T
-    b = np.zeros((3, 1))
-    b[0] = 1.0
-    if F[2] > 0:
-        b[1:, 0] = arms[:, 2].mean() * F[:2] / F[2]
-    L = np.empty((3, 3))
-    cholesky(A @ A.T + _WRENCH_REGULARIZATION * np.eye(3), L)
+    points, com, n_c = state.contact_positions, state.com, len(state.contact_positions)
+    F_x, F_y = state.mass * com_acceleration[0], state.mass * com_acceleration[1]
+    F_z = state.mass * (com_acceleration[2] + GRAVITY)
+    # w = Aᵀ (A Aᵀ + ε)⁻¹ b with a column (1, x_i, y_i) in A for every point, seen from the centre of mass.
+    A, b, L, column = np.zeros((3, 3)), np.zeros((3, 1)), np.empty((3, 3)), np.ones(3)
+    rise = 0.0
+    for i in range(n_c):
+        column[1], column[2] = points[i, 0] - com[0], points[i, 1] - com[1]
+        rise += (points[i, 2] - com[2]) / n_c
+        for j in range(3):
+            for k in range(3):
+                A[j, k] += column[j] * column[k]
+    for k in range(3):
+        A[k, k] += _WRENCH_REGULARIZATION
+    b[0, 0] = 1.0
+    if F_z > 0:
+        b[1, 0], b[2, 0] = rise * F_x / F_z, rise * F_y / F_z
+    cholesky(A, L)
     cholesky_solve(L, b)
-    w = A.T @ b  # (n_c, 1)
-    return np.maximum(w, 0.0) * F
+    for i in range(n_c):
+        share = b[0, 0] + b[1, 0] * (points[i, 0] - com[0]) + b[2, 0] * (points[i, 1] - com[1])
+        share = max(share, 0.0)
+        force[i, 0], force[i, 1], force[i, 2] = share * F_x, share * F_y, share * F_z

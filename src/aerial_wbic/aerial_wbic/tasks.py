@@ -11,12 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from aerial_model.block import cut, cut_rows
 from aerial_model.compiled import cholesky, cholesky_solve, compiled, inverse_of, log_of, product_of, quaternion
-from aerial_model.kinematics import Configuration
+from aerial_model.kinematics import Configuration, configuration_in
 from aerial_model.robot import BASE_ANGULAR, BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY, Robot
 from aerial_wbic.gains import ControllerGains, Feedback, TaskOrder
-from aerial_wbic.hierarchy import Task, prioritized, weighted
-from aerial_wbic.target import BodyTarget, WholeBodyTarget
+from aerial_wbic.hierarchy import Task, agreed, compromise, decided, priorities, subordinate, weigh_in
+from aerial_wbic.target import BodyTarget, WholeBodyTarget, target_in
 
 ANGULAR = slice(0, 3)  # rows of A_G and of momenta, thesis (2.5)
 LINEAR = slice(3, 6)
@@ -34,6 +35,24 @@ class Joints(NamedTuple):
     posed: np.ndarray  # (n_p,) that a posture is asked of: arms, or all that do not swing when there are none
 
 
+def _joints_block(rank: np.ndarray, mate: np.ndarray, *kinds: np.ndarray) -> np.ndarray:
+    """Return the block of numbers in which joints lie: how many points and joints of each kind, then as of ``Joints``."""
+    sizes = [len(rank), *(len(kind) for kind in kinds)]
+    return np.concatenate([sizes, rank, mate.ravel(), *kinds]).astype(int)
+
+
+@compiled
+def joints_in(block: np.ndarray) -> Joints:
+    """Return the joints that lie in a block."""
+    n_c = block[0]
+    rank, at = cut(block, 4, n_c)
+    mate, at = cut_rows(block, at, n_c, 2)
+    swinging, at = cut(block, at, block[1])
+    spare, at = cut(block, at, block[2])
+    posed, at = cut(block, at, block[3])
+    return Joints(rank, mate, swinging, spare, posed)
+
+
 class Limbs:
     """Which joints carry which contact point: a limb swings when its point is in the air and no loaded one needs it."""
 
@@ -45,10 +64,10 @@ class Limbs:
                 chains[i, model.joints[joint].idx_v - JOINT_VELOCITY.start] = True
         self._chains = chains  # (n_c, n)
         self._links = robot.contact_links
-        self._joints: dict[bytes, Joints] = {}  # what was asked before
+        self._joints: dict[bytes, np.ndarray] = {}  # what was asked before
 
-    def joints(self, contact: np.ndarray) -> Joints:
-        """Return the joints that tasks lead, given which points ``(n_c,)`` carry load."""
+    def joints(self, contact: np.ndarray) -> np.ndarray:
+        """Return the block with the ``Joints`` that tasks lead, given which points ``(n_c,)`` carry load."""
         key = contact.tobytes()
         if key not in self._joints:
             swinging = self._chains[~contact].any(axis=0) & ~self._chains[contact].any(axis=0)
@@ -65,7 +84,7 @@ class Limbs:
                 chain = self._chains[fellows].any(axis=0)
                 spare |= chain & (np.count_nonzero(chain) > rank[fellows].sum())
             each = (np.flatnonzero(joints) for joints in (swinging, spare, posed))
-            self._joints[key] = Joints(rank, mate, *each)
+            self._joints[key] = _joints_block(rank, mate, *each)
         return self._joints[key]
 
 
@@ -84,21 +103,23 @@ class Statement(IntEnum):
 class Arrangement(NamedTuple):
     """Which tasks the accelerations come from. Of all arrangements the type is the same: one compiled tick serves all."""
 
-    order: tuple[int, int, int, int]  # of Statement, the most important first
-    weights: np.ndarray  # (3,) of the tasks in one least-squares problem, or (0,) for strict priority
+    order: np.ndarray  # (4,) of Statement, the most important first
+    weights: np.ndarray  # (4,) of the tasks in one least-squares problem, or (0,) for strict priority
     limbs: Feedback  # gains of joints that are led
     angular_momentum_damping: float  # [1/s]
 
-    @classmethod
-    def of(cls, gains: ControllerGains) -> Arrangement:
-        """Return what a controller's gains ask for."""
-        weights = gains.task_weights if gains.tasks is TaskOrder.WEIGHTED else ()
-        return cls(
-            tuple(int(statement) for statement in _ORDERS[gains.tasks]),
-            np.array(weights, dtype=float),
-            gains.swing_joint,
-            gains.angular_momentum_damping,
-        )
+
+def arrangement_block(gains: ControllerGains) -> np.ndarray:
+    """Return the block with the ``Arrangement`` that a controller's gains ask for."""
+    weights = gains.task_weights if gains.tasks is TaskOrder.WEIGHTED else ()
+    return np.array([*gains.swing_joint, gains.angular_momentum_damping, *_ORDERS[gains.tasks], *weights], dtype=float)
+
+
+@compiled
+def arrangement_in(block: np.ndarray) -> Arrangement:
+    """Return the arrangement that lies in a block."""
+    order, at = cut(block, 3, 4)
+    return Arrangement(order, block[at:], Feedback(block[0], block[1]), block[2])
 
 
 _ORDERS = {
@@ -111,33 +132,34 @@ _ORDERS = {
 
 @compiled
 def command(
-    state: Configuration, target: WholeBodyTarget, joints: Joints, arrangement: Arrangement
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return q̈_cmd and q̇_ref ``(nv,)`` of the controller's tasks."""
-    tasks = arranged_tasks(state, target, joints, arrangement)
+    state_block: np.ndarray,
+    target_block: np.ndarray,
+    joints_block: np.ndarray,
+    arrangement_block: np.ndarray,
+    vdot: np.ndarray,
+    v_ref: np.ndarray,
+) -> None:
+    """Write q̈_cmd and q̇_ref ``(nv,)`` of the controller's tasks."""
+    state, target = configuration_in(state_block), target_in(target_block)
+    joints, arrangement = joints_in(joints_block), arrangement_in(arrangement_block)
     if len(arrangement.weights) > 0:
-        return weighted(state.M, tasks, arrangement.weights)
-    return prioritized(state.M_inv, tasks)
+        equations = compromise(state.M)
+        for i, weight in enumerate(arrangement.weights):
+            weigh_in(equations, task_of(int(arrangement.order[i]), state, target, joints, arrangement), weight)
+        agreed(equations, vdot, v_ref)
+        return
+    tasks, owned = priorities(state.L), 0
+    for statement in arrangement.order:
+        if owned < len(vdot):
+            owned = subordinate(tasks, owned, task_of(int(statement), state, target, joints, arrangement))
+    decided(tasks, vdot, v_ref)
 
 
 @compiled
-def arranged_tasks(
-    state: Configuration, target: WholeBodyTarget, joints: Joints, arrangement: Arrangement
-) -> tuple[Task, Task, Task, Task]:
-    """Return the controller's tasks at ``state``, most important first."""
-    first, second, third, fourth = arrangement.order
-    return (
-        _task(first, state, target, joints, arrangement),
-        _task(second, state, target, joints, arrangement),
-        _task(third, state, target, joints, arrangement),
-        _task(fourth, state, target, joints, arrangement),
-    )
-
-
-@compiled
-def _task(
+def task_of(
     statement: int, state: Configuration, target: WholeBodyTarget, joints: Joints, arrangement: Arrangement
 ) -> Task:
+    """Return what a ``Statement`` says at ``state``."""
     if statement == Statement.LIMBS:
         return limb_task(state, target, joints, arrangement.limbs)
     if statement == Statement.BASE:

@@ -17,9 +17,8 @@ import numpy as np
 
 from aerial_model.compiled import cholesky, cholesky_solve, compiled, friction_of
 from aerial_model.kinematics import Configuration
-from aerial_model.robot import JOINT_VELOCITY, Robot
+from aerial_model.robot import GRAVITY, JOINT_VELOCITY, Robot
 from aerial_wbic.gains import TouchdownSensing
-from aerial_wbic.target import GRAVITY
 
 _REGULARIZATION = 1e-4  # [m²] keeps forces of stretched legs small instead of undefined
 

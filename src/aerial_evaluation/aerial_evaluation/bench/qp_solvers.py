@@ -66,7 +66,7 @@ def solvers(subject: Subject) -> list[Row]:
                     elapsed = time.thread_time() - began
                     if repeat:
                         times[solver].append(elapsed)
-                        found[solver].append(solution)
+                        found[solver].append(copy.deepcopy(solution))  # the next overwrites it
         rows += [
             {
                 "motion": motion,
