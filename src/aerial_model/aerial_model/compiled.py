@@ -85,13 +85,14 @@ def lower_solve(L: np.ndarray, B: np.ndarray) -> None:
     """Replace B ``(m, k)`` by the solution X of L X = B."""
     m, k = B.shape
     for i in range(m):
-        for j in range(i):
-            factor = L[i, j]
+        inverse = 1.0 / L[i, i]
+        for c in range(k):
+            B[i, c] *= inverse
+        for j in range(i + 1, m):
+            factor = L[j, i]
             if factor != 0.0:
                 for c in range(k):
-                    B[i, c] -= factor * B[j, c]
-        for c in range(k):
-            B[i, c] /= L[i, i]
+                    B[j, c] -= factor * B[i, c]
 
 
 @compiled
@@ -99,13 +100,14 @@ def upper_solve(L: np.ndarray, B: np.ndarray) -> None:
     """Replace B ``(m, k)`` by the solution X of Lᵀ X = B."""
     m, k = B.shape
     for i in range(m - 1, -1, -1):
-        for j in range(i + 1, m):
-            factor = L[j, i]
+        inverse = 1.0 / L[i, i]
+        for c in range(k):
+            B[i, c] *= inverse
+        for j in range(i):
+            factor = L[i, j]
             if factor != 0.0:
                 for c in range(k):
-                    B[i, c] -= factor * B[j, c]
-        for c in range(k):
-            B[i, c] /= L[i, i]
+                    B[j, c] -= factor * B[i, c]
 
 
 @compiled

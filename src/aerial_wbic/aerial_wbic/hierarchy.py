@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aerial_model.compiled import cholesky, cholesky_solve, compiled, lower_solve, reordered
+from aerial_model.compiled import cholesky, cholesky_solve, compiled, lower_solve, reordered, upper_solve
 
 # Eigenvalues of J H⁻¹ Jᵀ, inverse inertias [1/kg].
 MOVABLE = (
@@ -64,12 +64,14 @@ def subordinate(above: Priorities, owned: int, task: Task) -> int:
     m, nv = len(task.a), len(L)
     if m == 0 or owned == nv:
         return owned
-    rows = np.empty((m, nv + 2))
+    columns, rows = np.empty((nv, m)), np.empty((m, nv + 2))
     for i in range(m):
         for k in range(nv):
-            rows[i, k] = task.J[i, k]
-    whiten(L, rows)
+            columns[k, i] = task.J[i, k]
+    upper_solve(L, columns)  # (J L⁻¹)ᵀ
     for i in range(m):
+        for k in range(nv):
+            rows[i, k] = columns[k, i]
         rows[i, nv], rows[i, nv + 1] = task.a[i], task.xdot[i]
     _subtract_commanded(rows, command)
     _project(rows, Q, owned)
@@ -133,18 +135,6 @@ def agreed(equations: Compromise, vdot: np.ndarray, v_ref: np.ndarray) -> None:
     vdot[:], v_ref[:] = equations.b[:, 0], equations.b[:, 1]
 
 
-@compiled
-def whiten(L: np.ndarray, J: np.ndarray) -> None:
-    """Replace the first nv columns of J ``(m, nv or more)`` by J L⁻¹, with L lower triangular ``(nv, nv)``."""
-    for i in range(len(J)):
-        for k in range(len(L) - 1, -1, -1):
-            if J[i, k] != 0.0:
-                J[i, k] /= L[k, k]
-                factor = J[i, k]
-                for c in range(k):
-                    J[i, c] -= factor * L[k, c]
-
-
 @reordered
 def _subtract_commanded(rows: np.ndarray, command: np.ndarray) -> None:
     """Take from what rows are to do, their last two numbers, what is commanded already."""
@@ -161,24 +151,27 @@ def _subtract_commanded(rows: np.ndarray, command: np.ndarray) -> None:
 @reordered
 def _project(rows: np.ndarray, Q: np.ndarray, owned: int) -> None:
     """Take from rows ``(m, nv or more)`` what lies in the span of the first rows of Q ``(nv, nv)``, which are orthonormal."""
-    nv = len(Q)
+    nv, along = len(Q), np.empty(owned)
     for i in range(len(rows)):
         for row in range(owned):
-            along = 0.0
+            inner = 0.0
             for k in range(nv):
-                along += rows[i, k] * Q[row, k]
+                inner += rows[i, k] * Q[row, k]
+            along[row] = inner
+        for row in range(owned):
+            part = along[row]
             for k in range(nv):
-                rows[i, k] -= along * Q[row, k]
+                rows[i, k] -= part * Q[row, k]
 
 
 @reordered
-def gram(J: np.ndarray, nv: int, A: np.ndarray) -> None:
-    """Write J Jᵀ into A ``(m, m)``, of the first nv columns."""
-    for i in range(len(J)):
+def _gram(rows: np.ndarray, nv: int, A: np.ndarray) -> None:
+    """Write the inner products ``(m, m)`` of rows, of their first nv numbers."""
+    for i in range(len(rows)):
         for j in range(i + 1):
             inner = 0.0
             for k in range(nv):
-                inner += J[i, k] * J[j, k]
+                inner += rows[i, k] * rows[j, k]
             A[i, j] = A[j, i] = inner
 
 
@@ -196,7 +189,7 @@ def owned_rows(rows: np.ndarray, enough: float) -> int:
     """
     m, nv = len(rows), rows.shape[1] - 2
     A, L = np.empty((m, m)), np.empty((m, m))
-    gram(rows, nv, A)
+    _gram(rows, nv, A)
     if cholesky(A, L) > _CERTAIN * enough:  # every row adds to those before
         lower_solve(L, rows)
         return m

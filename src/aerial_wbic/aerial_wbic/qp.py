@@ -21,11 +21,10 @@ import numpy as np
 from scipy import sparse
 
 from aerial_model.block import cut, cut_rows
-from aerial_model.compiled import cholesky, cholesky_solve, compiled, invert, lower_solve
+from aerial_model.compiled import cholesky, cholesky_solve, compiled, invert, lower_solve, upper_solve
 from aerial_model.contact import friction_pyramid
 from aerial_model.kinematics import Configuration, configuration_in
 from aerial_model.robot import JOINT_VELOCITY, Robot
-from aerial_wbic.hierarchy import gram, whiten
 from aerial_wbic.qp_solvers import INFINITY, N_BASE, Osqp, QpFactory
 
 _HELD = 1e-6  # [1/kg] below it no joint holds a direction of a point: straight legs, points of one foot
@@ -389,7 +388,7 @@ def give_way(state: Configuration, contact: np.ndarray, give: GiveWay) -> None:
         for c in range(N_BASE):
             E[i, c] = 1.0 if i == c else 0.0
     if rows > 0:
-        J_b, T = np.empty((rows, N_BASE)), np.empty((rows, n))
+        J_b, Tt = np.empty((rows, N_BASE)), np.empty((n, rows))
         row = 0
         for i in range(len(contact)):
             if contact[i]:
@@ -397,25 +396,31 @@ def give_way(state: Configuration, contact: np.ndarray, give: GiveWay) -> None:
                     for c in range(N_BASE):
                         J_b[row, c] = state.J_contacts[i, axis, c]
                     for j in range(n):
-                        T[row, j] = state.J_contacts[i, axis, first + j]
+                        Tt[j, row] = state.J_contacts[i, axis, first + j]
                     row += 1
         L_jj = np.empty((n, n))
         for i in range(n):
             for j in range(i + 1):
                 L_jj[i, j] = L[first + i, first + j]
-        whiten(L_jj, T)
-        A = np.empty((rows, rows))
-        gram(T, n, A)
+        upper_solve(L_jj, Tt)
+        A = np.zeros((rows, rows))
         for k in range(rows):
-            A[k, k] += _HELD
+            A[k, k] = _HELD
+        for j in range(n):
+            for i in range(rows):
+                factor = Tt[j, i]
+                if factor != 0.0:
+                    for k in range(rows):
+                        A[i, k] += factor * Tt[j, k]
         cholesky(A, A)
         cholesky_solve(A, J_b)
         moved = np.zeros((n, N_BASE))
-        for row in range(rows):
-            for j in range(n):
-                if T[row, j] != 0.0:
+        for j in range(n):
+            for row in range(rows):
+                factor = Tt[j, row]
+                if factor != 0.0:
                     for c in range(N_BASE):
-                        moved[j, c] -= T[row, j] * J_b[row, c]
+                        moved[j, c] -= factor * J_b[row, c]
         lower_solve(L_jj, moved)
         for j in range(n):
             for c in range(N_BASE):

@@ -150,7 +150,7 @@ def command(
         return
     tasks, owned = priorities(state.L), 0
     for statement in arrangement.order:
-        if owned < len(vdot):
+        if owned < len(vdot) and (statement != Statement.SPARE_JOINTS.value or len(joints.spare) > 0):
             owned = subordinate(tasks, owned, task_of(int(statement), state, target, joints, arrangement))
     decided(tasks, vdot, v_ref)
 
@@ -192,8 +192,10 @@ def limb_task(state: Configuration, target: WholeBodyTarget, joints: Joints, fee
     for i in range(len(joints.rank)):
         rank = joints.rank[i]
         if rank == 3:
-            J[row : row + 3] = state.J_contacts[i]
-            a[row : row + 3] = -state.Jdot_v_contacts[i]
+            for axis in range(3):
+                a[row + axis] = -state.Jdot_v_contacts[i, axis]
+                for k in range(len(state.v)):
+                    J[row + axis, k] = state.J_contacts[i, axis, k]
         elif rank > 0:
             across = _across(state.contact_positions, i, joints.mate[i])[:rank]
             first = joints.mate[i, 0]
@@ -280,18 +282,18 @@ def base_task(state: Configuration, body: BodyTarget) -> Task:
     The centre of mass stands for the base position, which follows from it when the limbs are where their task puts them:
     it is what a ballistic flight and the balance after landing depend on, whatever the limbs' errors.
     """
-    J = np.zeros((6, len(state.v)))
-    a, xdot = np.empty(6), np.empty(6)
-    attitude = body.gains.attitude
-
-    J[ANGULAR, BASE_ANGULAR] = state.R_WB
-    turn = attitude_error(body.orientation, state.q[BASE_ORIENTATION])
-    xdot[ANGULAR] = body.angular_velocity + attitude.stiffness / attitude.damping * turn
-    omega = state.R_WB @ state.v[BASE_ANGULAR]
-    a[ANGULAR] = body.angular_acceleration + attitude.damping * (xdot[ANGULAR] - omega)
-
-    _lead_com(state, body, Task(J, a, xdot))
-    return Task(J, a, xdot)
+    task = Task(np.zeros((6, len(state.v))), np.empty(6), np.empty(6))
+    attitude, first = body.gains.attitude, BASE_ANGULAR.start
+    turn = attitude_error_of(quaternion(body.orientation), quaternion(state.q[BASE_ORIENTATION]))
+    for i in range(3):
+        omega = 0.0
+        for k in range(3):
+            task.J[i, first + k] = state.R_WB[i, k]
+            omega += state.R_WB[i, k] * state.v[first + k]
+        task.xdot[i] = body.angular_velocity[i] + attitude.stiffness / attitude.damping * turn[i]
+        task.a[i] = body.angular_acceleration[i] + attitude.damping * (task.xdot[i] - omega)
+    _lead_com(state, body, task)
+    return task
 
 
 @compiled
@@ -311,10 +313,13 @@ def momentum_task(state: Configuration, target: WholeBodyTarget, damping: float)
 def _lead_com(state: Configuration, body: BodyTarget, task: Task) -> None:
     """Write into the ``LINEAR`` rows of a task that the centre of mass follows its course."""
     position = body.gains.position
-    task.J[LINEAR] = state.A_G[LINEAR] / state.mass
-    task.xdot[LINEAR] = body.com_velocity + position.stiffness / position.damping * (body.com - state.com)
-    task.a[LINEAR] = body.com_acceleration + position.damping * (task.xdot[LINEAR] - state.com_velocity)
-    task.a[LINEAR] -= state.Adot_v_G[LINEAR] / state.mass
+    for i in range(3):
+        row, rate = LINEAR.start + i, position.stiffness / position.damping
+        for k in range(len(state.v)):
+            task.J[row, k] = state.A_G[row, k] / state.mass
+        task.xdot[row] = body.com_velocity[i] + rate * (body.com[i] - state.com[i])
+        task.a[row] = body.com_acceleration[i] + position.damping * (task.xdot[row] - state.com_velocity[i])
+        task.a[row] -= state.Adot_v_G[row] / state.mass
 
 
 @compiled
@@ -335,4 +340,10 @@ def angular_momentum_task(state: Configuration, target: WholeBodyTarget, damping
 @compiled
 def attitude_error(desired: np.ndarray, actual: np.ndarray) -> np.ndarray:
     """Return Log(R_des Rᵀ) ``(3,)`` [rad] in W, of attitudes given as quaternions ``(4,)``."""
-    return np.array(log_of(product_of(quaternion(desired), inverse_of(quaternion(actual)))))
+    return np.array(attitude_error_of(quaternion(desired), quaternion(actual)))
+
+
+@compiled
+def attitude_error_of(desired: tuple, actual: tuple) -> tuple:
+    """Return the components of Log(R_des Rᵀ) [rad] in W, of attitudes given by the components of quaternions."""
+    return log_of(product_of(desired, inverse_of(actual)))
