@@ -24,6 +24,7 @@ import numpy as np
 
 from aerial_model.block import cut, cut_rows
 from aerial_model.compiled import (
+    ZERO,
     cholesky,
     cholesky_solve,
     compiled,
@@ -31,6 +32,7 @@ from aerial_model.compiled import (
     matrix_of,
     product_of,
     quaternion,
+    sum_of,
     vector,
 )
 from aerial_model.kinematics import Configuration, Kinematics, Workspace, carry, configuration_in, fill
@@ -180,19 +182,25 @@ def _predict(
     """
     belief, state = belief_in(belief_block), configuration_in(state_block)
     q, v = state.q, state.v
-    half_turn = exp_of(vector((gyro_before + gyro) * (dt / 4)))
-    midway = product_of(quaternion(belief.orientation), half_turn)
-    # The accelerometer reports the mean over the interval: it acts at the attitude half-way.
-    a = np.array(matrix_of(midway)) @ specific_force
-    a[2] -= GRAVITY
-    belief.orientation[:] = product_of(midway, half_turn)
-    _draw(belief.orientation, reported, min(dt / noise.attitude_time, 1.0))
     X, cov = belief.X, belief.P
-    X[P] += X[V] * dt + a * dt**2 / 2
-    X[V] += a * dt
-    X[FEET:] += belief.roll * dt
-    cov[P] += dt * cov[V]  # F P Fᵀ
-    cov[:, P] += dt * cov[:, V]
+    half_turn = exp_of(sum_of(ZERO, sum_of(vector(gyro_before), vector(gyro), 1.0), dt / 4))
+    midway = product_of(quaternion(belief.orientation), half_turn)
+    _draw(belief.orientation, product_of(midway, half_turn), quaternion(reported), min(dt / noise.attitude_time, 1.0))
+    # The accelerometer reports the mean over the interval: it acts at the attitude half-way.
+    R = matrix_of(midway)
+    for axis in range(3):
+        x, y, z = R[axis]
+        a = x * specific_force[0] + y * specific_force[1] + z * specific_force[2]
+        if axis == 2:
+            a -= GRAVITY
+        X[P, axis] += X[V, axis] * dt + a * dt**2 / 2
+        X[V, axis] += a * dt
+        for i in range(len(belief.roll)):
+            X[FEET + i, axis] += belief.roll[i, axis] * dt
+    for k in range(len(X)):
+        cov[P, k] += dt * cov[V, k]  # F P Fᵀ
+    for k in range(len(X)):
+        cov[k, P] += dt * cov[k, V]
     push = noise.acceleration**2 * dt**2
     cov[P, P] += push * dt**2 / 4
     cov[P, V] += push * dt / 2
@@ -205,10 +213,15 @@ def _predict(
 
 
 @compiled
-def _draw(orientation: np.ndarray, towards: np.ndarray, share: float) -> None:
-    """Draw an attitude ``(4,)`` to one close by, by ``share`` of the way."""
-    orientation += share * (np.copysign(1.0, orientation @ towards) * towards - orientation)
-    orientation /= np.sqrt(orientation @ orientation)
+def _draw(orientation: np.ndarray, attitude: tuple, towards: tuple, share: float) -> None:
+    """Write an attitude drawn to one close by, by ``share`` of the way; both by the components of quaternions."""
+    along = attitude[0] * towards[0] + attitude[1] * towards[1] + attitude[2] * towards[2] + attitude[3] * towards[3]
+    sign, squared = np.copysign(1.0, along), 0.0
+    for i in range(4):
+        orientation[i] = attitude[i] + share * (sign * towards[i] - attitude[i])
+        squared += orientation[i] ** 2
+    for i in range(4):
+        orientation[i] /= np.sqrt(squared)
 
 
 @compiled
@@ -246,23 +259,30 @@ def _correct_by_legs(
         # A sphere that rolls without slip on level ground has its centre moving at ω × (0, 0, radius).
         belief.roll[i, 0] = state.omega_contacts[i, 1] * radius[i]
         belief.roll[i, 1] = -state.omega_contacts[i, 0] * radius[i]
-        slip[row] = belief.roll[i] - state.J_contacts[i] @ state.v - X[V]
+        for axis in range(3):
+            slip[row, axis] = belief.roll[i, axis] - X[V, axis]
+            for k in range(len(state.v)):
+                slip[row, axis] -= state.J_contacts[i, axis, k] * state.v[k]
         distrust = _distrust(belief, i, slip[row], time, noise)
         if distrust > 1.0:
             _anchor(belief, i, state.contact_positions[i], noise)
         variance[row] = distrust
     # The points' velocities measure the same v: their mean, weighted by trust, stands for all.
-    trust = 1.0 / variance[:n]
-    H, innovation = np.zeros((n + 1, len(X))), np.empty((n + 1, 3))
-    H[:n, P] = 1.0
-    H[n, V] = 1.0
+    H, innovation, trust = np.zeros((n + 1, len(X))), np.zeros((n + 1, 3)), 0.0
     for row, i in enumerate(loaded):
-        H[row, FEET + i] = -1.0
-        innovation[row] = X[FEET + i] - state.contact_positions[i] - X[P]  # of 0 = p + R p_i − c_i
-    innovation[n] = trust @ slip / trust.sum()
-    variance[:n] *= noise.foot_position**2
-    in_motion = noise.foot_velocity_share**2 * (X[V] @ X[V])  # common to all points: no mean over them
-    variance[n] = noise.foot_velocity**2 / trust.sum() + in_motion
+        H[row, P], H[row, FEET + i] = 1.0, -1.0
+        trust += 1.0 / variance[row]
+        for axis in range(3):
+            innovation[row, axis] = (
+                X[FEET + i, axis] - state.contact_positions[i, axis] - X[P, axis]
+            )  # 0 = p + R p_i − c_i
+            innovation[n, axis] += slip[row, axis] / variance[row]
+        variance[row] *= noise.foot_position**2
+    H[n, V] = 1.0
+    innovation[n] /= trust
+    speed = X[V, 0] ** 2 + X[V, 1] ** 2 + X[V, 2] ** 2
+    in_motion = noise.foot_velocity_share**2 * speed  # common to all points: no mean over them
+    variance[n] = noise.foot_velocity**2 / trust + in_motion
     _apply(belief, H, innovation, variance)
 
 
@@ -273,7 +293,7 @@ def _distrust(belief: Belief, i: int, slip: np.ndarray, time: float, noise: Esti
     Large just after the scheduled touchdown, which may not have happened yet, and for a point that slips.
     """
     variance = belief.P[V, V] + noise.foot_velocity**2
-    slipping = (slip @ slip) / (3 * _GATE * variance)
+    slipping = (slip[0] ** 2 + slip[1] ** 2 + slip[2] ** 2) / (3 * _GATE * variance)
     age = max(time - belief.loaded_since[i], _INSTANT)
     return max(1.0, slipping) * max(1.0, noise.touchdown_time / age) ** 2
 
@@ -289,16 +309,33 @@ def _correct_position(belief: Belief, position: np.ndarray, noise: EstimatorNois
 @compiled
 def _apply(belief: Belief, H: np.ndarray, innovation: np.ndarray, variance: np.ndarray) -> None:
     """Kalman update with measurement rows H ``(m, 2 + n_c)``, innovations ``(m, 3)`` and variances ``(m,)``."""
-    HP = H @ belief.P
-    S = HP @ H.T
-    for i in range(len(variance)):
-        S[i, i] += variance[i]
+    X, cov, (m, n) = belief.X, belief.P, H.shape
+    HP, S = np.zeros((m, n)), np.zeros((m, m))
+    for i in range(m):
+        for k in range(n):
+            factor = H[i, k]
+            if factor != 0.0:
+                for c in range(n):
+                    HP[i, c] += factor * cov[k, c]
+    for j in range(m):
+        for k in range(n):
+            factor = H[j, k]
+            if factor != 0.0:
+                for i in range(m):
+                    S[i, j] += HP[i, k] * factor
+        S[j, j] += variance[j]
     cholesky(S, S)
     gain = HP.copy()
     cholesky_solve(S, gain)  # Kᵀ
-    belief.X[:] += gain.T @ innovation
-    left = belief.P - gain.T @ HP
-    belief.P[:] = (left + left.T) / 2
+    for i in range(m):
+        for row in range(n):
+            for axis in range(3):
+                X[row, axis] += gain[i, row] * innovation[i, axis]
+            for c in range(row + 1):
+                cov[row, c] -= gain[i, row] * HP[i, c]
+    for row in range(n):
+        for c in range(row):
+            cov[c, row] = cov[row, c]
 
 
 @compiled

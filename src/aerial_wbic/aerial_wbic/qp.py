@@ -8,9 +8,9 @@ to slip. Here the joints give way with the base: E δ_q is the motion with that 
 points stay where they are, and of these the one of least kinetic energy of the joints. The forces are then those that the
 ground really gives, and the torques those that go with them.
 
-A solver is set up once for every number of loaded points; the sparsity never changes, a tick updates numbers. The problem
-is scaled, as a fixed penalty needs it to converge: the variables are √Q_1 δ_q and √Q_2 δ_f, and the rows of the equations
-of motion are multiplied by √Q_1 (S_fb H E)⁻¹, so that cost and equality are both of unit size.
+The equations of motion of the base give δ_q for any δ_f, so the forces are the only variables; they are scaled, x = √Q_2 δ_f,
+as a fixed penalty needs it to converge. A solver is set up once for every number of loaded points; the sparsity never
+changes, a tick updates numbers.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import sparse
 
 from aerial_model.block import cut, cut_rows
 from aerial_model.compiled import cholesky, cholesky_solve, compiled, invert, lower_solve, upper_solve
 from aerial_model.contact import friction_pyramid
 from aerial_model.kinematics import Configuration, configuration_in
 from aerial_model.robot import JOINT_VELOCITY, Robot
-from aerial_wbic.qp_solvers import INFINITY, N_BASE, Osqp, QpFactory
+from aerial_wbic.qp_solvers import INFINITY, N_BASE, Osqp, QpFactory, blank_program, program_in
 
 _HELD = 1e-6  # [1/kg] below it no joint holds a direction of a point: straight legs, points of one foot
+_FACES = 5  # of a pyramid
 _LEVER = 0.2  # [m] by which torques are divided, so that their rows are as large as those of forces
 
 
@@ -161,29 +161,21 @@ _NO_FORCE = np.zeros(0)
 class _Program:
     """The problem of ``n`` loaded points and the limits of ``n_limits`` joints, all of them or none.
 
-    Variables: [√Q_1 δ_q (6); √Q_2 δ_f (3 n)]; rows: [equations of motion (6); pyramids (5 n); torques (n_limits)].
+    Rows: [pyramids (5 n); torques (n_limits)].
     """
 
     def __init__(
         self, n: int, n_limits: int, pyramid: np.ndarray, weight_base: float, weight_force: float, solver: QpFactory
     ) -> None:
-        self._pyramid = pyramid
-        self._root_base, self._root_force = float(np.sqrt(weight_base)), float(np.sqrt(weight_force))
-        variables, limits = N_BASE + 3 * n, N_BASE + len(pyramid) * n
-        rows = limits + n_limits
-        A = np.zeros((rows, variables))
-        A[:N_BASE, :N_BASE] = np.eye(N_BASE)
-        A[:N_BASE, N_BASE:] = 1.0  # dense: changes with the state
-        A[N_BASE:limits, N_BASE:] = np.kron(np.eye(n), pyramid) / self._root_force
-        A[limits:] = 1.0  # dense: changes with the state
-        self._A = sparse.csc_matrix(A)
-        column = np.repeat(np.arange(variables), np.diff(self._A.indptr))
-        changing = (self._A.indices < N_BASE) & (column >= N_BASE)
-        self._changing = np.flatnonzero(changing).reshape(3 * n, N_BASE)  # by column
-        self._limits = np.flatnonzero(self._A.indices >= limits).reshape(variables, n_limits)  # by column
-        self._lower = np.zeros(rows)
-        self._upper = np.full(rows, INFINITY)
-        self._solver = solver(self._A, self._lower, self._upper)
+        root_base, root_force = float(np.sqrt(weight_base)), float(np.sqrt(weight_force))
+        faces = len(pyramid) * n
+        self._program = program = blank_program(3 * n, faces + n_limits, root_base, root_force)
+        program.A[:faces] = np.kron(np.eye(n), pyramid) / root_force
+        program.upper[:] = INFINITY
+        np.fill_diagonal(program.H, 1.0)
+        limits = np.zeros_like(program.A, dtype=bool)
+        limits[faces:] = True
+        self._solver = solver(program, limits if n_limits else None)
 
     def solve(
         self,
@@ -195,27 +187,12 @@ class _Program:
         room: Room | None = None,
     ) -> np.ndarray | None:
         """Return √Q_2 δ_f ``(3 n,)`` of the loaded points, or None; ``room`` for one with limits, the rest as of the whole."""
-        root_base, root_force = self._root_base, self._root_force
-        A, lower, upper = self._A.data, self._lower, self._upper
-        _state_problem(
-            state.block,
-            vdot_cmd,
-            f_cmd,
-            contact,
-            give,
-            root_base,
-            root_force,
-            self._changing,
-            self._pyramid,
-            A,
-            lower,
-            upper,
-        )
+        wish = state.block, vdot_cmd, f_cmd, contact, give
+        if not _state_problem(*wish, self._program.block):  # a solver might not end
+            return None
         if room is not None:
-            _state_limits(
-                state.block, vdot_cmd, f_cmd, contact, give, room, root_base, root_force, self._limits, A, lower, upper
-            )
-        return self._solver.minimum(self._A, lower, upper)
+            _state_limits(*wish, room, self._program.block)
+        return self._solver.minimum()
 
 
 @compiled
@@ -225,41 +202,49 @@ def _state_problem(
     f_cmd: np.ndarray,
     contact: np.ndarray,
     give_block: np.ndarray,
-    root_base: float,
-    root_force: float,
-    changing: np.ndarray,
-    pyramid: np.ndarray,
-    A: np.ndarray,
-    lower: np.ndarray,
-    upper: np.ndarray,
-) -> None:
-    """Write this tick's numbers into the entries ``changing`` ``(3 n, 6)`` of A, into the bounds and into ``give``.
+    program_block: np.ndarray,
+) -> bool:
+    """Write this tick's numbers into a program and into ``give``; return whether they are finite.
 
-    The rows of the equations of motion say √Q_1 δ_q = √Q_1 (S_fb H E)⁻¹ (S_fb J_cᵀ δ_f + what f_cmd leaves missing).
+    The equations of motion say √Q_1 δ_q = √Q_1 (S_fb H E)⁻¹ (S_fb J_cᵀ δ_f + what f_cmd leaves missing) = G x + g.
     """
-    state, give = configuration_in(state_block), give_way_in(give_block)
+    state, give, program = configuration_in(state_block), give_way_in(give_block), program_in(program_block)
+    H, f, A, G, g = program.H, program.f, program.A, program.G, program.g
     give_way(state, contact, give)
     missing = _missing(state, vdot_cmd, f_cmd, contact)
     for row in range(N_BASE):
-        given = 0.0
+        g[row] = 0.0
         for k in range(N_BASE):
-            given += give.inverse[row, k] * missing[k]
-        lower[row] = upper[row] = root_base * given
-    scale = -root_base / root_force
-    n, rows = 0, len(pyramid)
+            g[row] += program.root_base * give.inverse[row, k] * missing[k]
+    scale, n = program.root_base / program.root_force, 0
     for i in range(len(contact)):
         if not contact[i]:
             continue
         for axis in range(3):
             for row in range(N_BASE):
-                given = 0.0
+                lift = 0.0
                 for k in range(N_BASE):
-                    given += give.inverse[row, k] * state.J_contacts[i, axis, k]
-                A[changing[3 * n + axis, row]] = scale * given
-        for row in range(rows):
-            inside = pyramid[row, 0] * f_cmd[i, 0] + pyramid[row, 1] * f_cmd[i, 1] + pyramid[row, 2] * f_cmd[i, 2]
-            lower[N_BASE + n * rows + row] = -inside
+                    lift += give.inverse[row, k] * state.J_contacts[i, axis, k]
+                G[row, 3 * n + axis] = scale * lift
+        for face in range(_FACES * n, _FACES * (n + 1)):
+            inside = 0.0
+            for axis in range(3):
+                inside += A[face, 3 * n + axis] * f_cmd[i, axis]
+            program.lower[face] = -program.root_force * inside
         n += 1
+    at, finite = 0, True
+    for j in range(len(f)):
+        f[j] = 0.0
+        for k in range(N_BASE):
+            f[j] += G[k, j] * g[k]
+        finite = finite and np.isfinite(f[j])
+        for i in range(j + 1):
+            inner = 1.0 if i == j else 0.0
+            for k in range(N_BASE):
+                inner += G[k, i] * G[k, j]
+            H[i, j] = H[j, i] = program.triangle[at] = inner
+            at += 1
+    return finite
 
 
 @compiled
@@ -270,43 +255,42 @@ def _state_limits(
     contact: np.ndarray,
     give_block: np.ndarray,
     room: Room,
-    root_base: float,
-    root_force: float,
-    limits: np.ndarray,
-    A: np.ndarray,
-    lower: np.ndarray,
-    upper: np.ndarray,
+    program_block: np.ndarray,
 ) -> None:
-    """Write the rows of the torques into the entries ``limits`` ``(6 + 3 n, n)`` of A and into the bounds.
+    """Write the rows of the torques into a program of which the rest is written.
 
     They say least ≤ τ_cmd + H_j E δ_q − J_jᵀ δ_f ≤ greatest, the bounds moved apart to admit the torques without force.
     """
-    state, give = configuration_in(state_block), give_way_in(give_block)
-    loaded = np.flatnonzero(contact)
-    n_joints = limits.shape[1]
+    state, give, program = configuration_in(state_block), give_way_in(give_block), program_in(program_block)
+    A, lower, upper = program.A, program.lower, program.upper
+    loaded, n_joints = np.flatnonzero(contact), len(room.least)
     begin = len(lower) - n_joints
-    force = np.zeros_like(f_cmd)
+    force, torque_cmd = np.zeros_like(f_cmd), np.empty(n_joints)
     H_E = state.M @ give.E
     free = give.inverse @ _missing(state, vdot_cmd, force, contact)
     for i in loaded:
         force[i] = f_cmd[i]
-    torque_cmd = np.empty(n_joints)
     _inverse_dynamics(state, vdot_cmd, force, torque_cmd)
     for j in range(n_joints):
         row = JOINT_VELOCITY.start + j
-        without = state.M[row] @ vdot_cmd + state.nle[row]
+        without, missing = state.nle[row], 0.0
+        for k in range(len(vdot_cmd)):
+            without += state.M[row, k] * vdot_cmd[k]
+        A[begin + j] = 0.0
         for c in range(N_BASE):
-            A[limits[c, j]] = H_E[row, c] / (_LEVER * root_base)
             without += H_E[row, c] * free[c]
+            missing += H_E[row, c] * program.g[c] / program.root_base
+            for k in range(A.shape[1]):
+                A[begin + j, k] += H_E[row, c] * program.G[c, k] / (_LEVER * program.root_base)
         bears = False
         for n, i in enumerate(loaded):
             for k in range(3):
                 slope = state.J_contacts[i, k, row]
                 bears |= slope != 0.0
-                A[limits[N_BASE + 3 * n + k, j]] = -slope / (_LEVER * root_force)
+                A[begin + j, 3 * n + k] -= slope / (_LEVER * program.root_force)
         if bears:
-            lower[begin + j] = (min(room.least[j], without) - torque_cmd[j]) / _LEVER
-            upper[begin + j] = (max(room.greatest[j], without) - torque_cmd[j]) / _LEVER
+            lower[begin + j] = (min(room.least[j], without) - torque_cmd[j] - missing) / _LEVER
+            upper[begin + j] = (max(room.greatest[j], without) - torque_cmd[j] - missing) / _LEVER
         else:
             lower[begin + j], upper[begin + j] = -INFINITY, INFINITY
 

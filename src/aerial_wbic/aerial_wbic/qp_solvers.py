@@ -1,9 +1,4 @@
-"""Solvers of the controller's quadratic program, all of which take it in the same form.
-
-    min ½ (yᵀ y + xᵀ x)   s.t.   lower ≤ A [y; x] ≤ upper
-
-with y = √Q_1 δ_q in the first six columns and x = √Q_2 δ_f in the others; the first six rows are equations, [I  −G] [y; x] = g.
-"""
+"""Solvers of the controller's quadratic program, all of which take it in the same form."""
 
 from __future__ import annotations
 
@@ -15,38 +10,83 @@ import numpy as np
 import osqp
 from scipy import sparse
 
+from aerial_model.block import cut, cut_rows
 from aerial_model.compiled import compiled
 from aerial_wbic.gains import QpSolver
 
-N_BASE = 6  # rows of the equations of motion of the base
+N_BASE = 6  # accelerations of the base
 INFINITY = osqp.constant("OSQP_INFTY")
 _SETTINGS = {
     "verbose": False,
     "scaling": 0,  # done here
     "adaptive_rho": False,
-    "alpha": 1.2,
-    "eps_abs": 1e-4,
-    "eps_rel": 1e-5,
-    "check_termination": 5,
+    "alpha": 1.0,  # without over-relaxation a step is exact as long as no face of a pyramid is met
+    "eps_abs": 1e-5,
+    "eps_rel": 1e-6,
+    "check_termination": 3,
     "warm_starting": True,
     "polishing": False,
 }
-# The penalty was found on recorded motions: it takes 15 iterations in the median and 20 to 30 at the 99th percentile, of a
-# quadruped's jump, roll and flip as of a humanoid's jump, spin and flip. What is far from what the ground can give takes
-# hundreds; an active-set method is faster there.
-_PENALTY = {"rho": 0.2, "max_iter": 150}
+# The penalty was found on recorded motions: a quadruped's jump, roll and flips take 3 iterations in the median and at the
+# 99th percentile, a humanoid's jump, spin and flip 9 in the median. What is far from what the ground can give takes hundreds;
+# an active-set method is faster there.
+_PENALTY = {"rho": 0.1, "max_iter": 60}
 _DAQP_SOLVED = 1
 _ACCEPTED = (osqp.SolverStatus.OSQP_SOLVED, osqp.SolverStatus.OSQP_SOLVED_INACCURATE)
 
 
+class QuadraticProgram(NamedTuple):
+    """min ½ xᵀ H x + fᵀ x  s.t. lower ≤ A x ≤ upper, with x = √Q_2 δ_f; all of it lies in one block and changes in place."""
+
+    H: np.ndarray  # (3 n, 3 n)
+    triangle: np.ndarray  # its upper triangle, column by column
+    f: np.ndarray  # (3 n,)
+    A: np.ndarray  # (m, 3 n)
+    lower: np.ndarray  # (m,)
+    upper: np.ndarray  # (m,)
+    G: np.ndarray  # (6, 3 n): how the base gives way, √Q_1 δ_q = G x + g
+    g: np.ndarray  # (6,)
+    root_base: float  # √Q_1
+    root_force: float  # √Q_2
+    block: np.ndarray  # what all of it lies in
+
+
+_N, _M, _ROOT_BASE, _ROOT_FORCE, _HEADER = range(
+    5
+)  # where a block says how many variables and rows there are, and weights
+
+
+def blank_program(n: int, m: int, root_base: float, root_force: float) -> QuadraticProgram:
+    """Return the memory of a program of n variables and m rows."""
+    block = np.zeros(_HEADER + n * n + n * (n + 1) // 2 + n + m * n + 2 * m + N_BASE * n + N_BASE)
+    block[:_HEADER] = n, m, root_base, root_force
+    return program_in(block)
+
+
+@compiled
+def program_in(block: np.ndarray) -> QuadraticProgram:
+    """Return the program that lies in a block."""
+    n, m = int(block[_N]), int(block[_M])
+    H, at = cut_rows(block, _HEADER, n, n)
+    triangle, at = cut(block, at, n * (n + 1) // 2)
+    f, at = cut(block, at, n)
+    A, at = cut_rows(block, at, m, n)
+    lower, at = cut(block, at, m)
+    upper, at = cut(block, at, m)
+    G, at = cut_rows(block, at, N_BASE, n)
+    g, at = cut(block, at, N_BASE)
+    return QuadraticProgram(H, triangle, f, A, lower, upper, G, g, block[_ROOT_BASE], block[_ROOT_FORCE], block)
+
+
 class QpMinimizer(Protocol):
-    """What solves the problems of one sparsity."""
+    """What solves the problems that one program is to state."""
 
-    def minimum(self, A: sparse.csc_matrix, lower: np.ndarray, upper: np.ndarray) -> np.ndarray | None:
-        """Return x ``(3 n,)`` at the optimum, which the caller checks to be finite; None if none is found."""
+    def minimum(self) -> np.ndarray | None:
+        """Return x ``(3 n,)`` at the optimum of the program as it is; None if none is found."""
 
 
-QpFactory = Callable[[sparse.csc_matrix, np.ndarray, np.ndarray], QpMinimizer]  # of a first problem of the sparsity
+QpFactory = Callable[[QuadraticProgram, np.ndarray | None], QpMinimizer]
+# Of a program, and of which entries of A ``(m, 3 n)`` bool change and are not zero; None: none ever changes.
 
 
 class Osqp:
@@ -56,26 +96,30 @@ class Osqp:
     not solved in time is left to DAQP.
     """
 
-    def __init__(self, A: sparse.csc_matrix, lower: np.ndarray, upper: np.ndarray) -> None:
-        rows, variables = A.shape
-        self._nothing = np.zeros(variables), np.zeros(rows)
+    def __init__(self, program: QuadraticProgram, pattern: np.ndarray | None) -> None:
+        n, m = len(program.f), len(program.lower)
+        self._program = program
+        self._nothing = np.zeros(n), np.zeros(m)
         self._solver = osqp.OSQP()
-        P = sparse.eye(variables, format="csc")
-        self._solver.setup(P, self._nothing[0], A, lower, upper, **_SETTINGS, **_PENALTY)
-        self._second = Daqp(A, lower, upper)
-        reduced(A.data, A.indices, A.indptr, lower, upper)  # compiles what no tick may
+        A = sparse.csc_matrix(program.A if pattern is None else pattern | (program.A != 0))
+        self._entries = None if pattern is None else (A.indices, np.repeat(np.arange(n), np.diff(A.indptr)))
+        P = sparse.csc_matrix(np.triu(np.ones((n, n))))
+        self._solver.setup(P, program.f, A.astype(float), program.lower, program.upper, **_SETTINGS, **_PENALTY)
+        self._second = Daqp(program, pattern)
         self._core = self._solver._solver  # OSQP itself: the wrapper's bookkeeping takes longer than the solution
 
-    def minimum(self, A: sparse.csc_matrix, lower: np.ndarray, upper: np.ndarray) -> np.ndarray | None:
+    def minimum(self) -> np.ndarray | None:
         """Return √Q_2 δ_f; None if DAQP, the second to try, finds none either."""
-        self._core.update_data_vec(q=None, l=lower, u=upper)
-        self._core.update_data_mat(P_x=None, P_i=None, A_x=A.data, A_i=None)
+        program = self._program
+        A = None if self._entries is None else program.A[self._entries]
+        self._core.update_data_vec(q=program.f, l=program.lower, u=program.upper)
+        self._core.update_data_mat(P_x=program.triangle, P_i=None, A_x=A, A_i=None)
         x = self._attempt()
         if x is not None:
-            return x[N_BASE:]
+            return x
         x, y = self._nothing
         self._solver.warm_start(x=x, y=y)
-        return self._second.minimum(A, lower, upper)
+        return self._second.minimum()
 
     def _attempt(self) -> np.ndarray | None:
         """Return the variables that OSQP finds; None if it gives up."""
@@ -84,67 +128,16 @@ class Osqp:
 
 
 class Daqp:
-    """DAQP, an active-set method, on the problem of x alone; every problem from nothing."""
+    """DAQP, an active-set method; every problem from nothing."""
 
-    def __init__(self, A: sparse.csc_matrix, lower: np.ndarray, upper: np.ndarray) -> None:
-        self._sense = np.zeros(len(lower) - N_BASE, dtype=np.int32)  # inequalities
+    def __init__(self, program: QuadraticProgram, pattern: np.ndarray | None) -> None:
+        inequalities = np.zeros(len(program.lower), dtype=np.int32)
+        self._problem = program.H, program.f, program.A, program.upper, program.lower, inequalities
 
-    def minimum(self, A: sparse.csc_matrix, lower: np.ndarray, upper: np.ndarray) -> np.ndarray | None:
-        """Return √Q_2 δ_f; None if DAQP finds none, or the problem is not finite."""
-        problem = reduced(A.data, A.indices, A.indptr, lower, upper)
-        if not np.isfinite(problem.f).all():  # it would not end
-            return None
-        x, _, status, _ = daqp.solve(*problem, self._sense)
+    def minimum(self) -> np.ndarray | None:
+        """Return √Q_2 δ_f; None if DAQP finds none."""
+        x, _, status, _ = daqp.solve(*self._problem)
         return x if status == _DAQP_SOLVED else None
-
-
-class Reduced(NamedTuple):
-    """min ½ xᵀ H x + fᵀ x  s.t. lower ≤ A x ≤ upper, in the order in which DAQP takes it."""
-
-    H: np.ndarray  # (3 n, 3 n)
-    f: np.ndarray  # (3 n,)
-    A: np.ndarray  # (m, 3 n)
-    upper: np.ndarray  # (m,)
-    lower: np.ndarray  # (m,)
-
-
-@compiled
-def reduced(data: np.ndarray, indices: np.ndarray, indptr: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> Reduced:
-    """Return the problem of x = √Q_2 δ_f; the first six rows of A say y = √Q_1 δ_q = G x + g.
-
-    Args:
-        data: entries of A by columns.
-        indices: their rows.
-        indptr: where each column begins, and the end.
-        lower: least values of A's rows; the first six are equations.
-        upper: greatest values.
-    """
-    rows, n = len(lower) - N_BASE, len(indptr) - 1 - N_BASE
-    G, A_y = np.zeros((N_BASE, n)), np.zeros((rows, N_BASE))
-    A, H, f = np.zeros((rows, n)), np.eye(n), np.zeros(n)
-    above, below = upper[N_BASE:].copy(), lower[N_BASE:].copy()
-    for column in range(N_BASE + n):
-        for entry in range(indptr[column], indptr[column + 1]):
-            row = indices[entry]
-            if column < N_BASE and row >= N_BASE:
-                A_y[row - N_BASE, column] = data[entry]
-                above[row - N_BASE] -= data[entry] * lower[column]
-                below[row - N_BASE] -= data[entry] * lower[column]
-            elif column >= N_BASE and row < N_BASE:
-                G[row, column - N_BASE] = -data[entry]
-                f[column - N_BASE] -= data[entry] * lower[row]
-            elif column >= N_BASE:
-                A[row - N_BASE, column - N_BASE] = data[entry]
-    for i in range(n):
-        for j in range(n):
-            for k in range(N_BASE):
-                H[i, j] += G[k, i] * G[k, j]
-    for row in range(rows):
-        for k in range(N_BASE):
-            if A_y[row, k] != 0.0:
-                for j in range(n):
-                    A[row, j] += A_y[row, k] * G[k, j]
-    return Reduced(H, f, A, above, below)
 
 
 SOLVERS: dict[QpSolver, QpFactory] = {QpSolver.OSQP: Osqp, QpSolver.DAQP: Daqp}

@@ -1,6 +1,6 @@
 """Solvers that the controller does not use, on its quadratic programs: what a benchmark compares with.
 
-They get the problem of the forces alone, as DAQP does. Whoever is not installed is left out.
+Whoever is not installed is left out.
 """
 
 from __future__ import annotations
@@ -8,9 +8,8 @@ from __future__ import annotations
 from importlib.util import find_spec
 
 import numpy as np
-from scipy import sparse
 
-from aerial_wbic.qp_solvers import INFINITY, QpFactory, reduced
+from aerial_wbic.qp_solvers import INFINITY, QpFactory, QuadraticProgram
 
 _ACCURACY = 1e-6  # of ProxQP's residuals; an active-set method has none
 _BOUNDED = 0.1 * INFINITY  # a bound beyond it is none
@@ -19,20 +18,20 @@ _BOUNDED = 0.1 * INFINITY  # a bound beyond it is none
 class Proxqp:
     """ProxQP, a proximal augmented-Lagrangian method, dense; from the solution of the last problem."""
 
-    def __init__(self, A: sparse.csc_matrix, lower: np.ndarray, upper: np.ndarray) -> None:
+    def __init__(self, program: QuadraticProgram, pattern: np.ndarray | None) -> None:
         from proxsuite import proxqp
 
-        problem = reduced(A.data, A.indices, A.indptr, lower, upper)
+        self._program = program
         self._solved = proxqp.PROXQP_SOLVED
-        self._qp = proxqp.dense.QP(len(problem.f), 0, len(problem.upper))
+        self._qp = proxqp.dense.QP(len(program.f), 0, len(program.upper))
         self._qp.settings.eps_abs = _ACCURACY
         self._qp.settings.compute_timings = False
         self._qp.settings.initial_guess = proxqp.WARM_START_WITH_PREVIOUS_RESULT
         self._begun = False
 
-    def minimum(self, A: sparse.csc_matrix, lower: np.ndarray, upper: np.ndarray) -> np.ndarray | None:
+    def minimum(self) -> np.ndarray | None:
         """Return x ``(3 n,)``; None if ProxQP finds none."""
-        problem = reduced(A.data, A.indices, A.indptr, lower, upper)
+        problem = self._program
         state = self._qp.update if self._begun else self._qp.init
         state(H=problem.H, g=problem.f, C=problem.A, l=problem.lower, u=problem.upper)
         self._begun = True
@@ -43,14 +42,14 @@ class Proxqp:
 class Quadprog:
     """quadprog, the dual active-set method of Goldfarb and Idnani; every problem from nothing."""
 
-    def __init__(self, A: sparse.csc_matrix, lower: np.ndarray, upper: np.ndarray) -> None:
+    def __init__(self, program: QuadraticProgram, pattern: np.ndarray | None) -> None:
         import quadprog
 
-        self._solve = quadprog.solve_qp
+        self._program, self._solve = program, quadprog.solve_qp
 
-    def minimum(self, A: sparse.csc_matrix, lower: np.ndarray, upper: np.ndarray) -> np.ndarray | None:
+    def minimum(self) -> np.ndarray | None:
         """Return x ``(3 n,)``; None if quadprog finds none."""
-        problem = reduced(A.data, A.indices, A.indptr, lower, upper)
+        problem = self._program
         above, below = problem.upper < _BOUNDED, problem.lower > -_BOUNDED
         C = np.vstack([-problem.A[above], problem.A[below]]).T  # Cᵀ x ≥ b
         b = np.concatenate([-problem.upper[above], problem.lower[below]])
