@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aerial_model.block import cut_rows
+from aerial_model.block import cut
 from aerial_model.compiled import compiled, friction_of, torque_bounds_of, voltage_of
 from aerial_model.kinematics import Kinematics
 from aerial_model.robot import JOINT_POSITION, JOINT_VELOCITY, Robot
@@ -36,21 +36,41 @@ class _Law(NamedTuple):
     share: float  # of the limits that may be asked for
 
 
-def _law_block(robot: Robot, gains: ControllerGains, lightness: np.ndarray) -> np.ndarray:
-    model, n = robot.model, robot.n_joints
-    is_arm = np.zeros(n)
-    is_arm[robot.arms] = 1.0
-    rows = [np.array(getattr(robot.actuators, name)) for name in _Law._fields[:6]]
-    rows += [gains.joint_damping * lightness]
-    rows += [model.lowerPositionLimit[JOINT_POSITION], model.upperPositionLimit[JOINT_POSITION], is_arm]
-    return np.concatenate([[gains.stiction_speed, gains.actuator_share], *rows])
+def _law_block(robot: Robot, gains: ControllerGains, joint_damping: np.ndarray) -> np.ndarray:
+    law, model = robot.actuators, robot.model
+    is_arm = np.isin(np.arange(robot.n_joints), robot.arms)
+    lower_stop, upper_stop = model.lowerPositionLimit[JOINT_POSITION], model.upperPositionLimit[JOINT_POSITION]
+    rows = [law.torque_max, law.bus_voltage, law.volts_per_torque, law.volts_per_speed, law.damping, law.dry_friction]
+    rows += [joint_damping, lower_stop, upper_stop, is_arm]
+    return np.concatenate([*rows, [gains.stiction_speed, gains.actuator_share]]).astype(float)
 
 
 @compiled
 def _law_in(block: np.ndarray) -> _Law:
-    rows, _ = cut_rows(block, 2, 10, (len(block) - 2) // 10)
+    n = len(block) // 10
+    torque_max, at = cut(block, 0, n)
+    bus_voltage, at = cut(block, at, n)
+    volts_per_torque, at = cut(block, at, n)
+    volts_per_speed, at = cut(block, at, n)
+    damping, at = cut(block, at, n)
+    dry_friction, at = cut(block, at, n)
+    joint_damping, at = cut(block, at, n)
+    lower_stop, at = cut(block, at, n)
+    upper_stop, at = cut(block, at, n)
+    is_arm, at = cut(block, at, n)
     return _Law(
-        rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6], rows[7], rows[8], rows[9], block[0], block[1]
+        torque_max,
+        bus_voltage,
+        volts_per_torque,
+        volts_per_speed,
+        damping,
+        dry_friction,
+        joint_damping,
+        lower_stop,
+        upper_stop,
+        is_arm,
+        block[at],
+        block[at + 1],
     )
 
 
@@ -63,10 +83,9 @@ class Drive:
 
     def __init__(self, robot: Robot, gains: ControllerGains) -> None:
         lightness = _lightness(robot, gains.joint_damping)
-        self._law = _law_block(robot, gains, lightness)
-        n = robot.n_joints
-        self._zeros = np.zeros(n)
+        self._zeros = np.zeros(robot.n_joints)
         self._joint_damping = gains.joint_damping * lightness
+        self._law = _law_block(robot, gains, self._joint_damping)
         self._posture_stiffness = gains.posture_stiffness * lightness
         self._stop_damping = gains.stop_damping * lightness
         self.saturated_ticks = 0
@@ -78,9 +97,9 @@ class Drive:
     def command(self, torque: np.ndarray, v_ref: np.ndarray, measurement: Measurement) -> Command:
         """Return the command for the torques that the equations of motion ask for.
 
-        To them it adds the friction of the joints moving at q̇_ref. Damping about q̇_ref rides along. Arms, which bear
-        nothing, are asked for no more than they have room for. Whatever happened before, a command is finite: else the
-        joints are only damped.
+        To them it adds the friction of the joints moving at q̇_ref. Damping about q̇_ref rides along, but for what would run
+        a joint into its stop. Arms, which bear nothing, are asked for no more than they have room for. Whatever happened
+        before, a command is finite: else the joints are only damped.
 
         Args:
             torque: of the joints ``(n,)`` [N·m].

@@ -57,6 +57,7 @@ class Phases:
         self._no_point = np.zeros(robot.n_contacts, dtype=bool)
         self._time = 0.0
         self._plan_begin: float | None = None  # [s]
+        self._following: Following | None = None  # of the plan that runs
         self._way: Hold | Fold | None = None  # to rest; None: a plan is followed or joints are damped
         self._next_way: Callable[[Configuration], Hold | Fold] | None = self._to_stance  # from the next tick on
 
