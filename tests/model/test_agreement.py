@@ -7,7 +7,7 @@ import pytest
 
 from aerial_model.kinematics import Kinematics
 from aerial_model.robot import BASE_ANGULAR, BASE_LINEAR, BASE_ORIENTATION, JOINT_POSITION, Robot
-from aerial_model.rotation import matrix, skew
+from aerial_model.rotation import matrix
 from aerial_model.terrain import Terrain
 from aerial_sim import world
 
@@ -114,7 +114,7 @@ def test_accelerations_under_gravity_and_torque_agree(robot, built, random_state
     data = _mujoco_at(built, q, v, torque)
     vdot = pin.aba(robot.model, robot.model.createData(), q, v, np.concatenate([np.zeros(6), torque]))
     expected = _velocity_map(built, q) @ vdot
-    expected[:3] += matrix(q[BASE_ORIENTATION]) @ skew(v[BASE_ANGULAR]) @ v[BASE_LINEAR]
+    expected[:3] += matrix(q[BASE_ORIENTATION]) @ pin.skew(v[BASE_ANGULAR]) @ v[BASE_LINEAR]
     np.testing.assert_allclose(data.qacc, expected, atol=TOLERANCE * np.abs(expected).max())
 
 

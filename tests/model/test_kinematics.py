@@ -4,7 +4,7 @@ import pytest
 
 from aerial_model import rotation
 from aerial_model.kinematics import Kinematics, carry
-from aerial_model.robot import BASE_LINEAR, BASE_ORIENTATION, BASE_POSITION, Robot
+from aerial_model.robot import BASE_LINEAR, BASE_ORIENTATION, BASE_POSITION, GRAVITY, Robot
 
 ROBOT = Robot.load("mini_cheetah")
 STEP = 1e-6  # [s] of the central differences
@@ -62,6 +62,10 @@ def test_link_rates_are_those_of_pinocchio(state):
     axes = pin.LOCAL_WORLD_ALIGNED
     rates = [pin.getFrameVelocity(ROBOT.model, data, frame, axes).angular for frame in ROBOT.contact_frames]
     np.testing.assert_allclose(Kinematics(ROBOT).at(q, v).omega_contacts, rates, atol=1e-12)
+
+
+def test_pinocchio_has_the_same_gravity():
+    np.testing.assert_array_equal(ROBOT.model.gravity.vector, [0.0, 0.0, -GRAVITY, 0.0, 0.0, 0.0])
 
 
 def test_a_robot_that_is_carried_is_the_robot_there(state):

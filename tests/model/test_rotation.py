@@ -28,14 +28,6 @@ def test_exp_agrees_with_pinocchio(phi):
     np.testing.assert_allclose(rotation.matrix(rotation.exp(phi)), pin.exp3(phi), atol=1e-9)
 
 
-@given(vectors, vectors, st.floats(0.0, 1.0))
-def test_slerp_turns_at_a_constant_rate(a, b, fraction):
-    qa, qb = rotation.exp(a), rotation.exp(b)
-    whole = rotation.log(rotation.multiply(rotation.conjugate(qa), qb))
-    part = rotation.log(rotation.multiply(rotation.conjugate(qa), rotation.slerp(qa, qb, fraction)))
-    np.testing.assert_allclose(part, fraction * whole, atol=1e-7)
-
-
 @given(st.floats(-3.1, 3.1))
 def test_heading_of_a_turn_about_z_is_its_angle(yaw):
     assert abs(rotation.heading(rotation.about_z(yaw)) - yaw) < TOLERANCE
@@ -44,8 +36,3 @@ def test_heading_of_a_turn_about_z_is_its_angle(yaw):
 def test_tilt_is_the_angle_to_the_vertical_whatever_the_heading():
     leaning = rotation.multiply(rotation.about_z(1.0), rotation.exp(np.array([0.3, 0.0, 0.0])))
     assert abs(rotation.tilt(leaning) - 0.3) < TOLERANCE
-
-
-@given(vectors, vectors)
-def test_skew_is_the_cross_product(a, b):
-    np.testing.assert_allclose(rotation.skew(a) @ b, np.cross(a, b), atol=TOLERANCE)

@@ -10,7 +10,7 @@ import pytest
 from aerial_evaluation.landing import OBSERVE_TIME, Tick, judge
 from aerial_model import rotation
 from aerial_model.errors import InvalidPlanError, RefusalCode, RefusalError
-from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, BASE_TWIST
+from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, BASE_TWIST, Robot
 from aerial_sim.simulation import Simulation
 from aerial_wbic.controller import Controller
 from aerial_wbic.phase import Phase
@@ -183,6 +183,26 @@ def test_a_plan_that_is_not_finite_leaves_the_robot_standing(standing, hop):
         standing.controller.accept(dataclasses.replace(hop, v=v))
     standing.run(0.1)
     assert standing.controller.phase is Phase.STAND
+
+
+def test_contacts_of_a_plan_are_truth_values(standing, hop):
+    """Numbers would be taken for the numbers of points."""
+    with pytest.raises(InvalidPlanError, match="contact: expected truth values, found int8"):
+        standing.controller.accept(dataclasses.replace(hop, contact=hop.contact.astype(np.int8)))
+
+
+@pytest.mark.parametrize("value", [1e200, np.inf, np.nan])
+@pytest.mark.parametrize("name", ["joint_position", "joint_velocity", "angular_velocity", "linear_acceleration"])
+@pytest.mark.parametrize("robot_name", ["mini_cheetah", "mit_humanoid"])
+def test_no_measurement_ends_a_tick(robot_name, name, value):
+    robot = Robot.load(robot_name)
+    simulation, controller = Simulation(robot), Controller(robot)
+    measurement = simulation.measure()
+    controller.step(measurement)
+    broken = dataclasses.replace(measurement, **{name: np.full_like(getattr(measurement, name), value)})
+    command = controller.step(dataclasses.replace(broken, time=PERIOD, sequence=1))
+    assert np.isfinite(command.torque).all()
+    assert np.isfinite(command.damping).all()
 
 
 def test_a_plan_for_another_robot_is_refused(standing, hop):

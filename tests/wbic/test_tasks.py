@@ -233,7 +233,8 @@ def test_feet_with_several_points_are_held_without_saying_it_twice(mask):
 
 def test_in_the_air_nothing_asks_for_another_angular_momentum(robot, gains, state_at, target_at):
     state = state_at(3)
-    target = target_at(state, NONE)._replace(angular_momentum=state.angular_momentum + 1.0)
+    target = target_at(state, NONE)
+    target.angular_momentum[:] += 1.0
     task = angular_momentum_task(state, target, gains.angular_momentum_damping)
     vdot = np.linalg.lstsq(task.J, task.a, rcond=None)[0]
     np.testing.assert_allclose(state.A_G[:3] @ vdot + state.Adot_v_G[:3], 0.0, atol=1e-9)

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 
+from aerial_model.plan import Plan
 from aerial_model.plan_file import load_plan
 from aerial_model.robot import BASE_POSITION, Robot
 from aerial_sim.simulation import Simulation
@@ -26,6 +27,18 @@ def versions() -> dict[str, int]:
     modules = [module for name, module in sys.modules.items() if name.startswith("aerial_")]
     functions = {f for module in modules for f in vars(module).values() if isinstance(f, Dispatcher)}
     return {f"{f.__module__}.{f.__name__}": len(f.signatures) for f in functions}
+
+
+def awkward(plan: Plan) -> Plan:
+    """Return a plan whose arrays are of other kinds: read-only, column by column."""
+    arrays = {
+        field.name: np.asfortranarray(getattr(plan, field.name))
+        for field in dataclasses.fields(plan)
+        if isinstance(getattr(plan, field.name), np.ndarray)
+    }
+    for array in arrays.values():
+        array.flags.writeable = False
+    return dataclasses.replace(plan, **arrays)
 
 
 def main(plan_file: Path) -> None:
@@ -51,7 +64,7 @@ def main(plan_file: Path) -> None:
     go(STAND)
     controller.abort()
     go(MOTION, localized=True)
-    controller.accept(plan)
+    controller.accept(awkward(plan))
     go(STAND)
     assert controller.status.request_id == plan.request_id
     go(MOTION)

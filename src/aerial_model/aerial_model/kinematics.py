@@ -15,7 +15,6 @@ from aerial_model.block import cut, cut_rows
 from aerial_model.compiled import ZERO, compiled, cross_of, sum_of
 from aerial_model.robot import (
     BASE_ORIENTATION,
-    BASE_POSITION,
     GRAVITY,
     JOINT_VELOCITY,
     Robot,
@@ -28,7 +27,7 @@ class Configuration(NamedTuple):
     """Quantities of a robot at one state, in W with Pinocchio's v (base twist in B, linear first).
 
     A tuple of arrays, so that compiled code takes it as it is and writes into it: to return arrays to Python takes it a
-    microsecond each. All of them lie in one block.
+    microsecond each. All of them lie in one block, unless someone copies them apart.
     """
 
     q: np.ndarray  # (nq,)
@@ -48,11 +47,6 @@ class Configuration(NamedTuple):
     Jdot_v_contacts: np.ndarray  # J̇_c,i q̇ (n_c, 3) [m/s²]: the points' classical accelerations at q̈ = 0
     omega_contacts: np.ndarray  # angular velocities of the links the points are on (n_c, 3) [rad/s]
     block: np.ndarray  # what all these arrays lie in
-
-    @property
-    def base_position(self) -> np.ndarray:
-        """Base position ``(3,)`` [m]."""
-        return self.q[BASE_POSITION]
 
     @property
     def base_orientation(self) -> np.ndarray:

@@ -21,6 +21,7 @@ from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, JOINT_POSITION, 
 from aerial_model.terrain import Terrain
 
 QUATERNION_TOLERANCE = 1e-6  # deviation of the norm from 1
+_WIDTH = 7 + 6 + 9  # of a row that is interpolated, without joints: pose and twist of the base, r, ṙ, α
 
 
 class Target(NamedTuple):
@@ -41,8 +42,8 @@ class Target(NamedTuple):
 class Track(NamedTuple):
     """A plan as it is sampled."""
 
-    knots: np.ndarray  # all that is interpolated (K, nq + nv + 9): q, v, ṙ's place and rate, α
-    slopes: np.ndarray  # their change over the interval that follows, per second (K - 1, nq + nv + 9)
+    knots: np.ndarray  # rows [q, v, r, ṙ, α] (K, nq + nv + 9), units and frame as of the plan
+    slopes: np.ndarray  # their change over the interval that follows, per second (K − 1, nq + nv + 9)
     time: np.ndarray  # (K,) [s]
     force: np.ndarray  # (K, n_c, 3) [N]
     contact: np.ndarray  # (K, n_c) bool
@@ -50,13 +51,13 @@ class Track(NamedTuple):
     @classmethod
     def still(cls, n: int, n_c: int) -> Track:
         """Return a track of n joints and n_c contact points on which nothing moves."""
-        knots = np.zeros((2, 2 * n + 22))
+        knots = np.zeros((2, 2 * n + _WIDTH))
         return cls(knots, knots[1:].copy(), np.arange(2.0), np.zeros((2, n_c, 3)), np.zeros((2, n_c), dtype=bool))
 
     @property
     def n_joints(self) -> int:
         """Number of joints."""
-        return (self.knots.shape[1] - 22) // 2  # of (7 + n) + (6 + n) + 9
+        return (self.knots.shape[1] - _WIDTH) // 2
 
 
 @compiled
@@ -72,8 +73,8 @@ def sampled(track: Track, time: float) -> Target:
     orientation = product_of(begin, exp_of((share * turn[0], share * turn[1], share * turn[2])))
     for i in range(4):
         row[BASE_ORIENTATION.start + i] = orientation[i]
-    nq = (knots.shape[1] - 8) // 2  # of nq + (nq - 1) + 9
-    com, rest = 2 * nq - 1, 2 * nq + 2
+    nq = JOINT_POSITION.start + (knots.shape[1] - _WIDTH) // 2
+    com, rest = 2 * nq - 1, 2 * nq + 2  # nv = nq − 1
     return Target(
         row[:nq],
         row[nq:com],
@@ -148,6 +149,8 @@ class Plan:
                 raise InvalidPlanError(
                     f"plan field {name}: not finite at index {np.argwhere(~np.isfinite(value))[0].tolist()}"
                 )
+        if np.asarray(self.contact).dtype != bool:
+            raise InvalidPlanError(f"plan field contact: expected truth values, found {np.asarray(self.contact).dtype}")
         for name in ("take_off_time", "landing_time", "landing_com_height", "landing_yaw"):
             if not np.isfinite(getattr(self, name)):
                 raise InvalidPlanError(f"plan field {name}: expected a finite number, found {getattr(self, name)}")
@@ -199,12 +202,20 @@ class Plan:
 
     @cached_property
     def track(self) -> Track:
-        """What is interpolated."""
-        knots = np.hstack([self.q, self.v, self.com, self.com_velocity, self.angular_momentum])
-        slopes = np.diff(knots, axis=0) / np.diff(self.time)[:, None]
-        # Compiled code takes arrays of one kind: writable, row by row, whoever made the plan.
-        held = (np.array(values, order="C") for values in (self.time, self.force, self.contact))
-        return Track(knots, slopes, *held)
+        """The plan as it is sampled.
+
+        Raises:
+            InvalidPlanError: if it has less than two knots.
+        """
+        if len(self.time) < 2:
+            raise InvalidPlanError(f"plan field time: expected at least two times, found {len(self.time)}")
+        rows = np.hstack([self.q, self.v, self.com, self.com_velocity, self.angular_momentum])
+        slopes = np.diff(rows, axis=0) / np.diff(self.time)[:, None]
+        # Compiled code takes arrays of one kind, whoever made the plan: writable, row by row.
+        knots, slopes, time, force = (
+            np.array(each, dtype=float, order="C") for each in (rows, slopes, self.time, self.force)
+        )
+        return Track(knots, slopes, time, force, np.array(self.contact, dtype=bool, order="C"))
 
     @property
     def landing_pose(self) -> np.ndarray:

@@ -57,17 +57,6 @@ def tilt(q: np.ndarray) -> float:
     return float(np.arccos(np.clip(matrix(q)[2, 2], -1.0, 1.0)))
 
 
-def slerp(a: np.ndarray, b: np.ndarray, fraction: float) -> np.ndarray:
-    """Return the attitude ``(4,)`` at ``fraction`` of the shortest turn from ``a`` to ``b``."""
-    return multiply(a, exp(fraction * log(multiply(conjugate(a), b))))
-
-
-def skew(p: np.ndarray) -> np.ndarray:
-    """Return the matrix ``(3, 3)`` with ``skew(p) @ x = p × x``."""
-    x, y, z = p
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
 # The formulas, on tuples of components: numbers, or arrays of one shape. They compile as they stand.
 
 

@@ -1,6 +1,6 @@
 """The whole-body controller: a measurement in, a command out, 500 times a second.
 
-    estimator → phase → tasks → hierarchy → qp → drive
+    estimator → phase → target → tasks → hierarchy → qp → drive
 
 Without a plan the robot stands. A plan is followed from take-off through flight to its landing time; then the robot
 comes to rest over its feet and stands again, ready for the next.

@@ -71,10 +71,10 @@ def belief_in(block: np.ndarray) -> Belief:
     n_c = int(block[0])
     orientation, at = cut(block, 1, 4)
     X, at = cut_rows(block, at, FEET + n_c, 3)
-    P_, at = cut_rows(block, at, FEET + n_c, FEET + n_c)
+    covariance, at = cut_rows(block, at, FEET + n_c, FEET + n_c)
     roll, at = cut_rows(block, at, n_c, 3)
     loaded_since, at = cut(block, at, n_c)
-    return Belief(orientation, X, P_, roll, loaded_since, block)
+    return Belief(orientation, X, covariance, roll, loaded_since, block)
 
 
 class Estimator:

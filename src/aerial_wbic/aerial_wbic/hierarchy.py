@@ -20,11 +20,9 @@ import numpy as np
 
 from aerial_model.compiled import cholesky, cholesky_solve, compiled, lower_solve, reordered, upper_solve
 
-# Eigenvalues of J H⁻¹ Jᵀ, inverse inertias [1/kg].
-MOVABLE = (
-    0.01  # a direction that moves this much less than the robot as a whole is accelerated by half of what is asked
-)
-NOISE = 1e-9  # a direction below this is left to lower tasks
+# Of eigenvalues of J H⁻¹ Jᵀ, inverse inertias.
+MOVABLE = 0.01  # share of the robot's as a whole: a direction that moves that little does half of what is asked
+NOISE = 1e-9  # [1/kg] a direction below it is left to lower tasks
 _CERTAIN = 10.0  # times as movable: damping would change a hundredth
 EFFORT = 1e-3  # ε of weighted tasks [1/kg]: settles what none of them asks for, and hardly weighs on what they do
 
@@ -182,10 +180,10 @@ def owned_rows(rows: np.ndarray, enough: float) -> int:
     Args:
         rows: ``(m, nv + 2)``, in coordinates in which the mass matrix is the identity; the last two numbers are what a row
             is to do. Only the first are left, as many as are returned.
-        enough: inverse inertia [1/kg] from which on a direction does all of what it is asked for, nearly.
+        enough: inverse inertia [1/kg] at which a direction does half of what it is asked for.
 
     Returns:
-        The number of directions owned. As a rule it is m, and all can be moved.
+        The number of directions owned. As a rule it is m, and all can be moved. It is 0 if a row is not finite.
     """
     m, nv = len(rows), rows.shape[1] - 2
     A, L = np.empty((m, m)), np.empty((m, m))
@@ -193,6 +191,8 @@ def owned_rows(rows: np.ndarray, enough: float) -> int:
     if cholesky(A, L) > _CERTAIN * enough:  # every row adds to those before
         lower_solve(L, rows)
         return m
+    if not np.isfinite(A).all():  # it would raise
+        return 0
     eigenvalues, U = np.linalg.eigh(A)
     turned = np.ascontiguousarray(U.T) @ rows
     rank = 0

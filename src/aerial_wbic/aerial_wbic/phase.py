@@ -154,7 +154,7 @@ class Phases:
     def contacts(self) -> np.ndarray:
         """Return the points that carry load now, by the schedule ``(n_c,)`` bool."""
         if self.phase is Phase.TAKE_OFF:
-            return self.plan.contact[self.plan.interval(self._plan_time)]
+            return self.plan.track.contact[self.plan.interval(self._plan_time)]
         return self._no_point if self.phase is Phase.FLIGHT else self._all_points
 
     def target(self, state: Configuration) -> WholeBodyTarget | PostureTarget | None:

@@ -168,11 +168,10 @@ class _Program:
         self, n: int, n_limits: int, pyramid: np.ndarray, weight_base: float, weight_force: float, solver: QpFactory
     ) -> None:
         root_base, root_force = float(np.sqrt(weight_base)), float(np.sqrt(weight_force))
-        faces = len(pyramid) * n
+        faces = _FACES * n
         self._program = program = blank_program(3 * n, faces + n_limits, root_base, root_force)
         program.A[:faces] = np.kron(np.eye(n), pyramid) / root_force
         program.upper[:] = INFINITY
-        np.fill_diagonal(program.H, 1.0)
         limits = np.zeros_like(program.A, dtype=bool)
         limits[faces:] = True
         self._solver = solver(program, limits if n_limits else None)

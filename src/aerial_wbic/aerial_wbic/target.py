@@ -272,7 +272,7 @@ def _held(ways: np.ndarray, level: np.ndarray, time: float, state_block: np.ndar
 
 
 class Fold:
-    """Brings the legs from where they are to a pose, as fast as the poles of ``Settling`` let it.
+    """Brings the legs from where they are to a pose, as fast as the poles of ``settling`` let it.
 
     Args:
         state: of the robot at the beginning.

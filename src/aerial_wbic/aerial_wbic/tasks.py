@@ -111,8 +111,10 @@ class Arrangement(NamedTuple):
 
 def arrangement_block(gains: ControllerGains) -> np.ndarray:
     """Return the block with the ``Arrangement`` that a controller's gains ask for."""
-    weights = gains.task_weights if gains.tasks is TaskOrder.WEIGHTED else ()
-    return np.array([*gains.swing_joint, gains.angular_momentum_damping, *_ORDERS[gains.tasks], *weights], dtype=float)
+    order, weights = _ORDERS[gains.tasks], []
+    if gains.tasks is TaskOrder.WEIGHTED:
+        weights = [getattr(gains.task_weights, statement.name.lower()) for statement in order]
+    return np.array([*gains.swing_joint, gains.angular_momentum_damping, *order, *weights], dtype=float)
 
 
 @compiled

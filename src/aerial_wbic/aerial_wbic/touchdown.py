@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from aerial_model.compiled import cholesky, cholesky_solve, compiled, friction_of
-from aerial_model.kinematics import Configuration
+from aerial_model.kinematics import Configuration, configuration_in
 from aerial_model.robot import GRAVITY, JOINT_VELOCITY, Robot
 from aerial_wbic.gains import TouchdownSensing
 
@@ -66,15 +66,16 @@ class ContactSense:
             return np.zeros(len(state.contact_positions), dtype=bool)
         dt = time - before[0]
         share = min(dt / self._sensing.filter_time, 1.0)
-        force = _felt(self._residual, (state.v - before[1]) / dt, share, state, torque, self._losses)
+        force = _felt(self._residual, (state.v - before[1]) / dt, share, state.block, torque, self._losses)
         return force[:, 2] > self._threshold
 
 
 @compiled
 def _felt(
-    residual: np.ndarray, vdot: np.ndarray, share: float, state: Configuration, torque: np.ndarray, losses: _Losses
+    residual: np.ndarray, vdot: np.ndarray, share: float, block: np.ndarray, torque: np.ndarray, losses: _Losses
 ) -> np.ndarray:
     """Draw the residual ``(n,)`` to what this period shows; return the contact forces ``(n_c, 3)`` [N] in W behind it."""
+    state = configuration_in(block)
     speed = state.v[JOINT_VELOCITY]
     shown = state.M[JOINT_VELOCITY] @ vdot + state.nle[JOINT_VELOCITY] - torque
     shown += friction_of(speed, losses.damping, losses.dry_friction, losses.stiction_speed)

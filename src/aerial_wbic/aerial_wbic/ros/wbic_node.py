@@ -217,8 +217,10 @@ class WbicNode(node.AerialNode):
 
 def _check_makes_sense(measurement: Measurement) -> None:
     """Raise ValueError unless a measurement's numbers are finite and its quaternion is a rotation."""
-    rows = (measurement.joint_position, measurement.joint_velocity)
-    vectors = (measurement.orientation, measurement.angular_velocity, measurement.linear_acceleration)
+    rows = [measurement.joint_position, measurement.joint_velocity, measurement.joint_torque]
+    vectors = [measurement.orientation, measurement.angular_velocity, measurement.linear_acceleration]
+    if measurement.localization is not None:
+        vectors.append(measurement.localization)
     if not np.isfinite(np.concatenate((*rows, *vectors))).all():
         raise ValueError("expected finite numbers, found others")
     if abs(measurement.orientation @ measurement.orientation - 1.0) > QUATERNION_TOLERANCE:
