@@ -11,10 +11,18 @@ import pinocchio as pin
 from aerial_model import rotation
 from aerial_model.plan import Plan
 from aerial_model.request import MotionRequest
-from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, BASE_TWIST, JOINT_POSITION, JOINT_VELOCITY, Robot
+from aerial_model.robot import (
+    BASE_ORIENTATION,
+    BASE_POSITION,
+    BASE_TWIST,
+    GRAVITY,
+    JOINT_POSITION,
+    JOINT_VELOCITY,
+    Robot,
+)
 from aerial_planner.flight import integrate_flight
 from aerial_planner.reference import Reference
-from aerial_planner.schedule import GRAVITY, Schedule
+from aerial_planner.schedule import Schedule
 from aerial_planner.symbolic import BaseFrameModel
 from aerial_planner.trajectory import TakeOffTrajectory
 

@@ -30,12 +30,12 @@ import casadi as ca
 import numpy as np
 
 from aerial_model.contact import friction_pyramid
-from aerial_model.robot import Robot
+from aerial_model.robot import GRAVITY, Robot
 from aerial_planner.compiled import FunctionLibrary
 from aerial_planner.formulation import Formulation
 from aerial_planner.knots import FlightKnot, TakeOffKnot, foot_velocities, link_slopes, world_feet
 from aerial_planner.limits import Variant
-from aerial_planner.schedule import GRAVITY, Schedule, contact_bits
+from aerial_planner.schedule import Schedule, contact_bits
 from aerial_planner.settings import PlannerSettings
 from aerial_planner.solver import SolverOptions
 from aerial_planner.stage import Rows, StageKind

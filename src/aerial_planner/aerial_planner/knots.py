@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from aerial_model.robot import BASE_TWIST, JOINT_VELOCITY, Robot
-from aerial_planner.schedule import GRAVITY
+from aerial_model.robot import BASE_TWIST, GRAVITY, JOINT_VELOCITY, Robot
 from aerial_planner.symbolic import BaseFrameModel, quaternion_product, quaternion_step, rotation_matrix
 
 Matrix = np.ndarray | ca.SX

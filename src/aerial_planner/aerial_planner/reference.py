@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from aerial_model import rotation
-from aerial_model.robot import BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY, Robot
+from aerial_model.robot import BASE_ORIENTATION, GRAVITY, JOINT_POSITION, JOINT_VELOCITY, Robot
 from aerial_planner.inverse_kinematics import InverseKinematics
-from aerial_planner.schedule import GRAVITY, Schedule
+from aerial_planner.schedule import Schedule
 from aerial_planner.settings import PlannerSettings
 from aerial_planner.symbolic import BaseFrameModel
 

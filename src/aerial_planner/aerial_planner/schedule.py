@@ -19,10 +19,9 @@ from aerial_model import rotation
 from aerial_model.config import closest, from_mapping, load_yaml
 from aerial_model.errors import ConfigurationError, RefusalCode, RefusalError
 from aerial_model.request import MotionRequest
-from aerial_model.robot import Robot
+from aerial_model.robot import GRAVITY, Robot
 from aerial_model.scale import Scale, Unit
 
-GRAVITY = 9.81  # [m/s²]
 _CLEARANCE_SPARED = 0.6  # share of the clearance the optimizer may do without where it binds
 _FLIGHT_TIME_STRETCH = 1.2  # longest flight over the nominal one
 _SIDES = {"front": (0, 1), "rear": (0, -1), "left": (1, 1), "right": (1, -1)}  # axis and sign, seen from the centre

@@ -7,10 +7,10 @@ import pinocchio as pin
 
 from aerial_model.errors import RefusalCode, RefusalError
 from aerial_model.request import MotionRequest
-from aerial_model.robot import Robot
+from aerial_model.robot import GRAVITY, Robot
 from aerial_planner.checks import check_landing_feet
 from aerial_planner.reference import Reference
-from aerial_planner.schedule import GRAVITY, Schedule
+from aerial_planner.schedule import Schedule
 
 _GROUND_TOLERANCE = 1e-6  # between heights that are meant to be equal [m]
 

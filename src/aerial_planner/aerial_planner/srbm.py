@@ -16,13 +16,13 @@ import numpy as np
 
 from aerial_model import rotation
 from aerial_model.contact import friction_pyramid
-from aerial_model.robot import Robot
+from aerial_model.robot import GRAVITY, Robot
 from aerial_planner.compiled import FunctionLibrary
 from aerial_planner.formulation import Formulation
 from aerial_planner.inverse_kinematics import InverseKinematics
 from aerial_planner.knots import mean_com
 from aerial_planner.reference import Reference
-from aerial_planner.schedule import GRAVITY, Schedule, contact_bits
+from aerial_planner.schedule import Schedule, contact_bits
 from aerial_planner.settings import PlannerSettings
 from aerial_planner.solver import SolverOptions
 from aerial_planner.stage import Rows, StageData, StageKind

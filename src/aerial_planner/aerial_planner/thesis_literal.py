@@ -15,12 +15,12 @@ import casadi as ca
 import numpy as np
 
 from aerial_model import rotation
-from aerial_model.robot import Robot
+from aerial_model.robot import GRAVITY, Robot
 from aerial_planner.kino_dynamic import leg_inertia_along
 from aerial_planner.knots import holding_joints, link_slopes, mean_com
 from aerial_planner.limits import Variant
 from aerial_planner.reference import Reference
-from aerial_planner.schedule import GRAVITY, Schedule
+from aerial_planner.schedule import Schedule
 from aerial_planner.settings import PlannerSettings
 from aerial_planner.symbolic import (
     BaseFrameModel,
