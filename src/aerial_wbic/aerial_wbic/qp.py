@@ -20,13 +20,13 @@ from typing import NamedTuple
 import numpy as np
 
 from aerial_model.block import cut, cut_rows
-from aerial_model.compiled import cholesky, cholesky_solve, compiled, invert, lower_solve, upper_solve
+from aerial_model.compiled import compiled
 from aerial_model.contact import friction_pyramid
 from aerial_model.kinematics import Configuration, configuration_in
 from aerial_model.robot import JOINT_VELOCITY, Robot
-from aerial_wbic.qp_solvers import INFINITY, N_BASE, Osqp, QpFactory, blank_program, program_in
+from aerial_wbic.give_way import N_BASE, GiveWay, blank_give_way, give_way, give_way_in
+from aerial_wbic.qp_solvers import INFINITY, Osqp, QpFactory, blank_program, program_in
 
-_HELD = 1e-6  # [1/kg] below it no joint holds a direction of a point: straight legs, points of one foot
 _FACES = 5  # of a pyramid
 _LEVER = 0.2  # [m] by which torques are divided, so that their rows are as large as those of forces
 
@@ -47,28 +47,13 @@ class Room(NamedTuple):
     greatest: np.ndarray  # (n,) [N·m]
 
 
-class GiveWay(NamedTuple):
-    """How the robot gives way where the commanded accelerations and the forces do not fit; both lie in one block."""
-
-    E: np.ndarray  # (nv, 6) accelerations with that of the base, loaded points at rest
-    inverse: np.ndarray  # (S_fb H E)⁻¹ (6, 6): the base's acceleration for a wrench that is missing
-
-
-@compiled
-def give_way_in(block: np.ndarray) -> GiveWay:
-    """Return what lies in a block ``((nv + 6) · 6,)``."""
-    nv = len(block) // N_BASE - N_BASE
-    E, at = cut_rows(block, 0, nv, N_BASE)
-    inverse, at = cut_rows(block, at, N_BASE, N_BASE)
-    return GiveWay(E, inverse)
-
-
 class _Answer(NamedTuple):
     """Where a solution is written; all of it lies in one block."""
 
     vdot: np.ndarray  # as of Solution
     force: np.ndarray
     torque: np.ndarray
+    block: np.ndarray  # what all these arrays lie in
 
 
 @compiled
@@ -77,7 +62,7 @@ def _answer_in(block: np.ndarray, nv: int) -> _Answer:
     vdot, at = cut(block, 0, nv)
     torque, at = cut(block, at, n)
     force, at = cut_rows(block, at, (len(block) - at) // 3, 3)
-    return _Answer(vdot, force, torque)
+    return _Answer(vdot, force, torque, block)
 
 
 class ForceOptimization:
@@ -99,9 +84,9 @@ class ForceOptimization:
         self._root_force = float(np.sqrt(weight_force))
         # Of this tick; written in place.
         nv = robot.model.nv
-        self._give = np.zeros((nv + N_BASE) * N_BASE)
-        answers = [np.zeros(nv + robot.n_joints + 3 * robot.n_contacts) for _ in range(2)]
-        self._free, self._limited_answer = ((block, _answer_in(block, nv)) for block in answers)
+        self._give = blank_give_way(nv)
+        blocks = np.zeros((2, nv + robot.n_joints + 3 * robot.n_contacts))
+        self._free_answer, self._limited_answer = (_answer_in(block, nv) for block in blocks)
 
     def solve(self, state: Configuration, vdot_cmd: np.ndarray, f_cmd: np.ndarray, contact: np.ndarray) -> Solution:
         """Return the forces and the acceleration of (3.24), which hold until the next are asked for.
@@ -116,7 +101,7 @@ class ForceOptimization:
         """
         n = np.count_nonzero(contact)
         df = self._programs[n - 1].solve(state, vdot_cmd, f_cmd, contact, self._give) if n else _NO_FORCE
-        return self._solution(self._free, state, vdot_cmd, f_cmd, contact, df)
+        return self._solution(self._free_answer, state, vdot_cmd, f_cmd, contact, df)
 
     def within(
         self,
@@ -139,7 +124,7 @@ class ForceOptimization:
 
     def _solution(
         self,
-        memory: tuple[np.ndarray, _Answer],
+        answer: _Answer,
         state: Configuration,
         vdot_cmd: np.ndarray,
         f_cmd: np.ndarray,
@@ -147,10 +132,18 @@ class ForceOptimization:
         df: np.ndarray | None,
     ) -> Solution:
         """Return what follows from the optimum; with None, or what is not finite, the fallback."""
-        block, answer = memory
         found, solved = (_NO_FORCE, False) if df is None else (df, True)
         solved = _answer(
-            state.block, vdot_cmd, f_cmd, contact, self._give, found, solved, self._root_force, self._friction, block
+            state.block,
+            vdot_cmd,
+            f_cmd,
+            contact,
+            self._give.block,
+            found,
+            solved,
+            self._root_force,
+            self._friction,
+            answer.block,
         )
         return Solution(answer.vdot, answer.force, answer.torque, solved)
 
@@ -182,11 +175,11 @@ class _Program:
         vdot_cmd: np.ndarray,
         f_cmd: np.ndarray,
         contact: np.ndarray,
-        give: np.ndarray,
+        give: GiveWay,
         room: Room | None = None,
     ) -> np.ndarray | None:
         """Return √Q_2 δ_f ``(3 n,)`` of the loaded points, or None; ``room`` for one with limits, the rest as of the whole."""
-        wish = state.block, vdot_cmd, f_cmd, contact, give
+        wish = state.block, vdot_cmd, f_cmd, contact, give.block
         if not _state_problem(*wish, self._program.block):  # a solver might not end
             return None
         if room is not None:
@@ -356,64 +349,6 @@ def _answer(
             vdot[i] += give.E[i, c] * given
     _inverse_dynamics(state, vdot, force, answer.torque)
     return solved
-
-
-@compiled
-def give_way(state: Configuration, contact: np.ndarray, give: GiveWay) -> None:
-    """Write how the robot gives way while the points of ``contact`` ``(n_c,)`` bool stay at rest.
-
-    The joints' part of E is −H_jj⁻¹ J_jᵀ (J_j H_jj⁻¹ J_jᵀ)⁻¹ J_b; without contact it is zero. With H = Lᵀ L it is
-    H_jj = L_jjᵀ L_jj, and of T = J_j L_jj⁻¹ that part is −L_jj⁻¹ Tᵀ (T Tᵀ)⁻¹ J_b.
-    """
-    E, L, first = give.E, state.L, JOINT_VELOCITY.start
-    n, rows = len(E) - first, 3 * np.count_nonzero(contact)
-    for i in range(len(E)):
-        for c in range(N_BASE):
-            E[i, c] = 1.0 if i == c else 0.0
-    if rows > 0:
-        J_b, Tt = np.empty((rows, N_BASE)), np.empty((n, rows))
-        row = 0
-        for i in range(len(contact)):
-            if contact[i]:
-                for axis in range(3):
-                    for c in range(N_BASE):
-                        J_b[row, c] = state.J_contacts[i, axis, c]
-                    for j in range(n):
-                        Tt[j, row] = state.J_contacts[i, axis, first + j]
-                    row += 1
-        L_jj = np.empty((n, n))
-        for i in range(n):
-            for j in range(i + 1):
-                L_jj[i, j] = L[first + i, first + j]
-        upper_solve(L_jj, Tt)
-        A = np.zeros((rows, rows))
-        for k in range(rows):
-            A[k, k] = _HELD
-        for j in range(n):
-            for i in range(rows):
-                factor = Tt[j, i]
-                if factor != 0.0:
-                    for k in range(rows):
-                        A[i, k] += factor * Tt[j, k]
-        cholesky(A, A)
-        cholesky_solve(A, J_b)
-        moved = np.zeros((n, N_BASE))
-        for j in range(n):
-            for row in range(rows):
-                factor = Tt[j, row]
-                if factor != 0.0:
-                    for c in range(N_BASE):
-                        moved[j, c] -= factor * J_b[row, c]
-        lower_solve(L_jj, moved)
-        for j in range(n):
-            for c in range(N_BASE):
-                E[first + j, c] = moved[j, c]
-    weight = np.zeros((N_BASE, N_BASE))
-    for i in range(N_BASE):
-        for k in range(len(E)):
-            for c in range(N_BASE):
-                weight[i, c] += state.M[i, k] * E[k, c]
-    invert(weight, give.inverse)
 
 
 @compiled

@@ -13,8 +13,8 @@ from scipy import sparse
 from aerial_model.block import cut, cut_rows
 from aerial_model.compiled import compiled
 from aerial_wbic.gains import QpSolver
+from aerial_wbic.give_way import N_BASE
 
-N_BASE = 6  # accelerations of the base
 INFINITY = osqp.constant("OSQP_INFTY")
 _SETTINGS = {
     "verbose": False,
