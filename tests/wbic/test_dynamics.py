@@ -12,7 +12,7 @@ from aerial_model.robot import BASE_ANGULAR, BASE_LINEAR, JOINT_POSITION, JOINT_
 from aerial_model.terrain import Terrain
 from aerial_sim import world
 from aerial_wbic.qp import ForceOptimization
-from aerial_wbic.target import shared_load
+from aerial_wbic.support import shared_load
 from aerial_wbic.tasks import Limbs, arrangement_block
 
 TOLERANCE = 1e-6  # relative to the largest acceleration

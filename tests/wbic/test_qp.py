@@ -15,7 +15,7 @@ from aerial_wbic import qp_solvers
 from aerial_wbic.gains import QpSolver
 from aerial_wbic.qp import ForceOptimization, Room
 from aerial_wbic.qp_solvers import SOLVERS
-from aerial_wbic.target import shared_load
+from aerial_wbic.support import shared_load
 
 EQUATION_TOLERANCE = 1e-8  # [N], [N·m]
 FORCE_TOLERANCE = 0.1  # that a force may leave the pyramid [N]

@@ -1,4 +1,4 @@
-"""Targets: the way to rest begins where the robot is, the load is shared without turning the body."""
+"""Targets: the way to rest begins where the robot is and ends level over its support; a plan is followed."""
 
 from __future__ import annotations
 
@@ -7,11 +7,8 @@ import pytest
 
 from aerial_model import rotation
 from aerial_model.robot import BASE_ANGULAR
-from aerial_wbic.target import Fold, Following, Hold, shared_load, support_centre, supported
-
-GRAVITY = 9.81  # [m/s²]
-FORCE_TOLERANCE = 0.05  # [N], the regularization's part
-MOMENT_TOLERANCE = 0.05  # [N·m]
+from aerial_wbic.support import support_centre, supported
+from aerial_wbic.target import Fold, Following, Hold
 
 
 @pytest.fixture
@@ -22,28 +19,6 @@ def hold_of(gains, robot):
         return Hold(state, 2.0, rate=10.0, com_height=height, depth=0.1, turn=0.4, pose=pose, gains=gains.hold)
 
     return hold_of
-
-
-def moments(state, force):
-    return np.cross(state.contact_positions - state.com, force).sum(axis=0)
-
-
-@pytest.mark.parametrize("acceleration", [[0, 0, 0], [1.0, -0.5, 3.0], [0, 0, -9.0]])
-def test_the_load_is_shared_without_turning_the_body(robot, state_at, acceleration):
-    state = state_at(moving=False)
-    force = np.empty((4, 3))
-    shared_load(state, np.array(acceleration), force)
-    total = robot.mass * (np.array(acceleration) + [0, 0, GRAVITY])
-    np.testing.assert_allclose(force.sum(axis=0), total, atol=FORCE_TOLERANCE)
-    np.testing.assert_allclose(moments(state, force), 0.0, atol=MOMENT_TOLERANCE)
-    assert force[:, 2].min() >= 0
-
-
-def test_no_share_is_negative_when_the_body_leans_out(state_at):
-    state = state_at(moving=False)
-    force = np.empty((4, 3))
-    shared_load(state, np.array([8.0, 0.0, 0.0]), force)
-    assert force[:, 2].min() >= 0
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -69,22 +44,6 @@ def test_a_robot_that_lands_low_rises_no_faster_after_a_higher_fall(state_at, ho
     np.testing.assert_allclose(rises[1], rises[0], atol=1e-9)
     assert rises[0][0] == pytest.approx(0.0, abs=1e-9)
     assert rises[0][-1] == pytest.approx(0.1, abs=1e-3)
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_a_supported_acceleration_is_one_that_the_contact_points_give_without_turning_the_body(state_at, seed):
-    state = state_at(seed, moving=False)
-    wanted = np.random.default_rng(seed).uniform(-8, 8, 3)
-    given = supported(state, wanted)
-    force = state.mass * (given + [0.0, 0.0, GRAVITY])
-    points = state.contact_positions
-    meets = state.com[:2] - force[:2] / force[2] * (state.com[2] - points[:, 2].mean())
-    ahead = rotation.matrix(rotation.about_z(rotation.heading(state.base_orientation)))[:2, :2]
-    along, extent = meets @ ahead, points[:, :2] @ ahead
-    middle, half = (extent.max(axis=0) + extent.min(axis=0)) / 2, np.ptp(extent, axis=0) / 2
-    assert np.all(np.abs(along - middle) <= 0.81 * half)
-    assert given[2] == wanted[2]
-    np.testing.assert_allclose(supported(state, given), given, atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(5))
