@@ -11,11 +11,12 @@ import pytest
 from aerial_model import rotation
 from aerial_model.kinematics import Kinematics
 from aerial_model.robot import JOINT_POSITION, JOINT_VELOCITY, Robot
-from aerial_wbic.gains import ControllerGains, TaskOrder
+from aerial_wbic.gains import ControllerGains, TaskOrder, TaskWeights
 from aerial_wbic.hierarchy import Task, agreed, compromise, weigh_in
 from aerial_wbic.target import blank_target
 from aerial_wbic.tasks import (
     Limbs,
+    Statement,
     angular_momentum_task,
     arrangement_block,
     arrangement_in,
@@ -203,6 +204,14 @@ def test_without_arms_a_posture_is_asked_of_what_does_not_swing(robot, state_at,
     task = posture_task(state, target_at(state, ONE), posed, gains.swing_joint)
     np.testing.assert_array_equal(task.J @ state.v, state.v[JOINT_VELOCITY][posed])
     np.testing.assert_allclose(task.a, 0.0, atol=ROUNDING)
+
+
+def test_every_weighted_task_has_its_own_weight(gains):
+    weights = TaskWeights(limbs=1.0, base=2.0, spare_joints=3.0, angular_momentum=4.0)
+    said = arrangement_in(arrangement_block(dataclasses.replace(gains, tasks=TaskOrder.WEIGHTED, task_weights=weights)))
+    expected = {Statement.LIMBS: 1.0, Statement.BASE: 2.0, Statement.SPARE_JOINTS: 3.0, Statement.ANGULAR_MOMENTUM: 4.0}
+    assert dict(zip(said.order.astype(int), said.weights, strict=True)) == expected
+    assert not len(arrangement_in(arrangement_block(gains)).weights)
 
 
 def test_weighted_tasks_share_what_they_disagree_on():

@@ -1,7 +1,7 @@
 """Many arrays in one block of memory, so that compiled code is handed one array in place of all of them.
 
 To hand an array to compiled code takes 0.1 µs, twice as much on the cold caches of a real loop, whatever its size; a tick
-has two hundred to hand over. A structure whose arrays lie in one block begins with its sizes and is cut out of it on either
+had some two hundred to hand over. A structure whose arrays lie in one block begins with its sizes and is cut out of it on either
 side by the same function, such as ``kinematics.configuration_in``; both see the same memory.
 """
 

@@ -1,7 +1,8 @@
 """What runs in every tick is compiled by Numba: in numpy the same formulas take four times as long.
 
 The machine code is cached beside the sources (or where ``NUMBA_CACHE_DIR`` says): only the first start on a machine, or
-after sources have changed, compiles, for about half a minute. A tick must never do so: whoever owns compiled functions runs them before they are used.
+after sources have changed, compiles, for about a minute. A tick must never do so: whoever owns compiled functions runs them
+before they are used.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How the joints accelerate where the base gives way to forces that do not fit what is commanded: so that feet stay where they are.
+"""How joints accelerate when the base gives way to forces that do not fit what is commanded: feet stay where they are.
 
 That is E of q̈ = q̈_cmd + E δ_q in (3.24), where the thesis has [1; 0]; see ``qp`` for why.
 """

@@ -220,9 +220,9 @@ class Hold:
         return self._target
 
 
-_OFFSET, _RISE, _TILT, _JOINTS = 0, 3, 6, 9  # where in the ways to rest of a hold each begins
-# The centre of mass's from the centre of the support and its rise besides, both [m], the rotation vector from the level
-# attitude in W [rad], the joints' [rad].
+# Where in a hold's ways to rest each begins: of the centre of mass from the centre of the support, its rise besides, both [m],
+# of the attitude as a rotation vector in W from the level one [rad], of the joints [rad].
+_OFFSET, _RISE, _TILT, _JOINTS = 0, 3, 6, 9
 
 
 @compiled
