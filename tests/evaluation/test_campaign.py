@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from aerial_evaluation.campaign import Campaign, Trial, Variation, results, summary, trials, workers
-from aerial_evaluation.campaign_figure import draw
+from aerial_evaluation.campaign.campaign import Campaign, Trial, Variation, results, summary, trials, workers
+from aerial_evaluation.campaign.figure import draw
 from aerial_model.errors import ConfigurationError
-from aerial_model.request import MotionRequest
-from aerial_model.robot import Robot
+from aerial_model.robot.robot import Robot
+from aerial_model.values.request import MotionRequest
 from aerial_sim.conditions import Conditions
 
 
@@ -104,7 +104,7 @@ def test_a_refused_goal_is_a_trial_that_did_not_land():
 
 
 def test_a_scheduler_that_is_not_there_is_told(monkeypatch):
-    monkeypatch.setattr("aerial_evaluation.campaign.CONNECT_TIMEOUT", 0.5)
+    monkeypatch.setattr("aerial_evaluation.campaign.campaign.CONNECT_TIMEOUT", 0.5)
     with (
         pytest.raises(ConfigurationError, match="no Dask scheduler answers"),
         workers(1, "tcp://127.0.0.1:9"),

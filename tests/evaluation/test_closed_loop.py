@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from aerial_evaluation.closed_loop import Loop, terrain_in_world
-from aerial_model import rotation
-from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, Robot
-from aerial_model.state import Command, Estimate
-from aerial_model.terrain import Terrain
+from aerial_model.numerics import rotation
+from aerial_model.robot.robot import BASE_ORIENTATION, BASE_POSITION, Robot
+from aerial_model.values.command import Command
+from aerial_model.values.estimate import Estimate
+from aerial_model.values.terrain import Terrain
 from aerial_sim.simulation import Simulation
-from aerial_wbic.phase import Phase
+from aerial_wbic.behaviours.phase import Phase
 
 
 @pytest.fixture(scope="module")

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from aerial_evaluation.consistency import SAMPLES, Belief, sampled, summary
-from aerial_model import rotation
-from aerial_model.robot import BASE_LINEAR, BASE_ORIENTATION, BASE_POSITION, Robot
-from aerial_model.state import Estimate
-from aerial_wbic.phase import Phase
+from aerial_evaluation.judgement.consistency import SAMPLES, Belief, sampled, summary
+from aerial_model.numerics import rotation
+from aerial_model.robot.robot import BASE_LINEAR, BASE_ORIENTATION, BASE_POSITION, Robot
+from aerial_model.values.estimate import Estimate
+from aerial_wbic.behaviours.phase import Phase
 
 ORIGIN = np.array([1.0, -2.0, 0.16])
 ROBOT = Robot.load("mini_cheetah")

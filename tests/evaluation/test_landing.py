@@ -7,10 +7,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from aerial_evaluation.landing import OBSERVE_TIME, Tick, judge
-from aerial_model import rotation
-from aerial_model.plan import Plan
-from aerial_model.robot import BASE_ORIENTATION, Robot
+from aerial_evaluation.judgement.landing import OBSERVE_TIME, Tick, judge
+from aerial_model.numerics import rotation
+from aerial_model.robot.robot import BASE_ORIENTATION, Robot
+from aerial_model.values.plan import Plan
 from aerial_sim.ground_truth import GroundTruth
 
 DT = 0.002  # [s]

@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 from aerial_evaluation.robot_check import ERROR, check
-from aerial_model.robot_file import known_robots
+from aerial_model.robot.loading import known_robots
 
 
 @pytest.fixture

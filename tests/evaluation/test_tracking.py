@@ -6,11 +6,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from aerial_evaluation.landing import Tick
-from aerial_evaluation.tracking import FIGURES, PHASES, SAMPLES, sampled, summary
-from aerial_model import rotation
-from aerial_model.request import MotionRequest
-from aerial_model.robot import BASE_ANGULAR, BASE_ORIENTATION, BASE_POSITION, Robot
+from aerial_evaluation.judgement.landing import Tick
+from aerial_evaluation.judgement.tracking import FIGURES, PHASES, SAMPLES, sampled, summary
+from aerial_model.numerics import rotation
+from aerial_model.robot.robot import BASE_ANGULAR, BASE_ORIENTATION, BASE_POSITION, Robot
+from aerial_model.values.request import MotionRequest
 from aerial_planner.planner import Planner
 from aerial_sim.ground_truth import GroundTruth
 

@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from aerial_evaluation.verification import ATTITUDE_TOLERANCE, POSITION_TOLERANCE, verify
-from aerial_model.request import MotionRequest
-from aerial_model.robot import Robot
+from aerial_evaluation.judgement.verification import ATTITUDE_TOLERANCE, POSITION_TOLERANCE, verify
+from aerial_model.robot.robot import Robot
+from aerial_model.values.request import MotionRequest
 from aerial_planner.planner import Planner
 
 VELOCITY_TOLERANCE = 1e-6  # [m/s]

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerial_model.robot import Robot
+from aerial_model.robot.robot import Robot
 
 LAW = Robot.load("mini_cheetah").actuators
 LEG = slice(0, 3)  # ab/adduction, hip, knee

@@ -6,10 +6,10 @@ import pinocchio as pin
 import pytest
 
 from aerial_model.kinematics import Kinematics
-from aerial_model.robot import BASE_ANGULAR, BASE_LINEAR, BASE_ORIENTATION, JOINT_POSITION, Robot
-from aerial_model.rotation import matrix
-from aerial_model.terrain import Terrain
-from aerial_sim import world
+from aerial_model.numerics.rotation import matrix
+from aerial_model.robot.robot import BASE_ANGULAR, BASE_LINEAR, BASE_ORIENTATION, JOINT_POSITION, Robot
+from aerial_model.values.terrain import Terrain
+from aerial_sim.world import world
 
 TOLERANCE = 1e-8  # SI units, relative to 1 or to the largest entry
 MASS = {"mini_cheetah": 8.912, "mit_humanoid": 25.0}  # [kg]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from aerial_model.block import cut, cut_flags, cut_rows, flags_size
+from aerial_model.numerics.layout import cut, cut_flags, cut_rows, flags_size
 
 
 def test_parts_follow_each_other():

@@ -8,10 +8,10 @@ import sys
 
 import pytest
 
-from aerial_model.code_cache import sources
+from aerial_model.numerics.code_cache import sources
 
 CALLEE = """
-from aerial_model.compiled import compiled
+from aerial_model.numerics.jit import compiled
 FACTOR = {factor}
 @compiled
 def times(x: float) -> float:
@@ -19,7 +19,7 @@ def times(x: float) -> float:
 """
 CALLER = """
 from aerial_probe_callee import FACTOR, times
-from aerial_model.compiled import compiled
+from aerial_model.numerics.jit import compiled
 @compiled
 def twice(x: float) -> float:
     return times(x) + FACTOR * x
@@ -55,7 +55,12 @@ def test_sources_are_those_that_are_imported_and_no_others():
     import aerial_wbic.target  # noqa: F401  # what is asked about is loaded
 
     found = sources("aerial_wbic.target")  # some of what it imports stands on lines of its own
-    assert {"aerial_model.rotation", "aerial_model.plan", "aerial_wbic.settling"} <= found
+    assert {"aerial_model.numerics.rotation", "aerial_model.values.plan", "aerial_wbic.behaviours.settling"} <= found
     found = sources("aerial_model.kinematics")
-    assert {"aerial_model.block", "aerial_model.compiled", "aerial_model.rotation", "aerial_model.robot"} <= found
+    assert {
+        "aerial_model.numerics.layout",
+        "aerial_model.numerics.jit",
+        "aerial_model.numerics.rotation",
+        "aerial_model.robot.robot",
+    } <= found
     assert not any(name.startswith("aerial_wbic") for name in found)

@@ -2,9 +2,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from aerial_model.contact import holding_rows
 from aerial_model.kinematics import Kinematics
-from aerial_model.robot import Robot
+from aerial_model.robot.contact import holding_rows
+from aerial_model.robot.robot import Robot
 
 
 def held(robot, mask):

@@ -2,9 +2,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from aerial_model import rotation
 from aerial_model.kinematics import Kinematics, carry
-from aerial_model.robot import BASE_LINEAR, BASE_ORIENTATION, BASE_POSITION, GRAVITY, Robot
+from aerial_model.numerics import rotation
+from aerial_model.robot.robot import BASE_LINEAR, BASE_ORIENTATION, BASE_POSITION, GRAVITY, Robot
 
 ROBOT = Robot.load("mini_cheetah")
 STEP = 1e-6  # [s] of the central differences

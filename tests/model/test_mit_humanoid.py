@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from aerial_model.robot import Robot
+from aerial_model.robot.robot import Robot
 
 
 @pytest.fixture(scope="module")

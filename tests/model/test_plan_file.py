@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from aerial_model.errors import ConfigurationError, InvalidPlanError
-from aerial_model.plan import Plan
-from aerial_model.plan_file import load_plan, save_plan
-from aerial_model.robot import Robot
-from aerial_model.terrain import Box, Terrain
+from aerial_model.robot.robot import Robot
+from aerial_model.values.plan import Plan
+from aerial_model.values.plan_file import load_plan, save_plan
+from aerial_model.values.terrain import Box, Terrain
 
 K = 3
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from aerial_model.posture import crouch_depth, points_from_com, reaching
-from aerial_model.robot import Robot
+from aerial_model.robot.posture import crouch_depth, points_from_com, reaching
+from aerial_model.robot.robot import Robot
 
 
 @pytest.fixture(scope="module", params=["mini_cheetah", "mit_humanoid"])

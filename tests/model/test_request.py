@@ -3,10 +3,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerial_model import rotation
 from aerial_model.errors import ConfigurationError
-from aerial_model.request import LOWER_MARGIN, UPPER_MARGIN, MotionRequest
-from aerial_model.robot import Robot
+from aerial_model.numerics import rotation
+from aerial_model.robot.robot import Robot
+from aerial_model.values.request import LOWER_MARGIN, UPPER_MARGIN, MotionRequest
 
 ROBOT = Robot.load("mini_cheetah")
 STANDING = ROBOT.contact_positions(ROBOT.standing_configuration())

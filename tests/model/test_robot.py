@@ -7,8 +7,8 @@ import pytest
 import yaml
 
 from aerial_model.errors import ConfigurationError
-from aerial_model.robot import Robot
-from aerial_model.robot_file import known_robots
+from aerial_model.robot.loading import known_robots
+from aerial_model.robot.robot import Robot
 
 MINI_CHEETAH = known_robots()["mini_cheetah"]
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from aerial_model.errors import ConfigurationError
-from aerial_model.robot import Robot
-from aerial_model.robot_description import resolved
-from aerial_model.robot_file import known_robots
+from aerial_model.robot.loading import known_robots
+from aerial_model.robot.robot import Robot
+from aerial_model.robot.urdf import resolved
 
 LEG_KG = 0.54 + 0.634 + 0.064 + 2 * 0.055  # of the Mini Cheetah; the third rotor is on the trunk
 

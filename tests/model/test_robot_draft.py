@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from aerial_model.errors import ConfigurationError
-from aerial_model.robot import Robot
-from aerial_model.robot_draft import draft
-from aerial_model.robot_file import known_robots
+from aerial_model.robot.draft import draft
+from aerial_model.robot.loading import known_robots
+from aerial_model.robot.robot import Robot
 
 
 @pytest.fixture(params=["mini_cheetah", "mit_humanoid"])

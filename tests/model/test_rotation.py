@@ -3,7 +3,7 @@ import pinocchio as pin
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerial_model import rotation
+from aerial_model.numerics import rotation
 
 TOLERANCE = 1e-12
 near_and_far = st.one_of(st.floats(-3.0, 3.0), st.floats(-1e-7, 1e-7))

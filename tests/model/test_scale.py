@@ -1,7 +1,7 @@
 import pytest
 
-from aerial_model.robot import Robot
-from aerial_model.scale import Scale, Unit
+from aerial_model.robot.robot import Robot
+from aerial_model.robot.scale import Scale, Unit
 
 LARGER = Scale(mass=8.0, length=4.0)  # times twice as long
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from aerial_model.terrain import GAP_DEPTH, Box, Terrain
+from aerial_model.values.terrain import GAP_DEPTH, Box, Terrain
 
 
 def test_a_platform_is_high_behind_its_near_edge_and_the_floor_before_it():

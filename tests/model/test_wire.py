@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 
-from aerial_model.robot import Robot
-from aerial_model.ros.wire import CommandWire, StateWire
-from aerial_model.state import Command, Measurement
+from aerial_model.robot.robot import Robot
+from aerial_model.values.command import Command
+from aerial_model.values.measurement import Measurement
 from aerial_msgs.msg import JointCommand, RobotState
+from aerial_ros.wire import CommandWire, StateWire
 
 TIME = 1_764_130_000.25  # [s], of a robot whose clock is the calendar's
 VECTORS = ("angular_velocity", "linear_acceleration")

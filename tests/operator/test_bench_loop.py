@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from aerial_operator.loop_bench import JUMPS, _in_turn, _processor_time, tables
+from aerial_operator.bench.loop import JUMPS, _in_turn, _processor_time, tables
 
 FIGURES = {
     "seconds": 61.0,

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import yaml
 
-from aerial_model.plan_file import load_plan
-from aerial_model.robot import Robot
-from aerial_model.robot_file import known_robots
+from aerial_model.robot.loading import known_robots
+from aerial_model.robot.robot import Robot
+from aerial_model.values.plan_file import load_plan
 
 PLAN_KEYS = {
     *("motion", "robot", "variant", "warm_start", "solver", "success", "total_time_s", "solve_time_s", "srbm_time_s"),

@@ -5,10 +5,10 @@ import argparse
 import numpy as np
 import pytest
 
-from aerial_model.robot import Robot
+from aerial_model.robot.robot import Robot
 from aerial_operator.__main__ import join_negative_values
 from aerial_operator.console import UsageError
-from aerial_operator.goal import add_goal_arguments, request_from
+from aerial_operator.options.goal import add_goal_arguments, request_from
 
 ROBOT = Robot.load("mini_cheetah")
 

@@ -7,10 +7,10 @@ from rclpy.experimental import EventsExecutor
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from aerial_model.ros import qos
-from aerial_model.ros.messages import doubles
 from aerial_msgs.msg import MotionPlan, MotionResult, RobotState
-from aerial_operator.recording import TOPICS, Recorder, definition
+from aerial_operator.recording.recorder import TOPICS, Recorder, definition
+from aerial_ros import qos
+from aerial_ros.messages import doubles
 
 COUNT = 50
 

@@ -5,8 +5,8 @@ from enum import StrEnum
 import pytest
 
 from aerial_model.errors import ConfigurationError
-from aerial_model.robot import Robot
-from aerial_operator.settings import setting, with_settings
+from aerial_model.robot.robot import Robot
+from aerial_operator.options.settings import setting, with_settings
 
 ROBOT = Robot.load("mini_cheetah")
 

@@ -6,8 +6,8 @@ import sys
 
 from numba.core.dispatcher import Dispatcher
 
-from aerial_model.request import MotionRequest
-from aerial_model.robot import Robot
+from aerial_model.robot.robot import Robot
+from aerial_model.values.request import MotionRequest
 from aerial_planner.planner import Planner
 
 

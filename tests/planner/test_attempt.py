@@ -6,12 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from aerial_planner.attempt import Attempt, Outcome
-from aerial_planner.inverse_kinematics import InverseKinematics
-from aerial_planner.limits import Margin, Variant
-from aerial_planner.reference import body_reference
-from aerial_planner.schedule import contact_schedule, load_motion
-from aerial_planner.symbolic import base_frame_model
+from aerial_planner.formulation.limits import Margin, Variant
+from aerial_planner.kinematics.base_frame import base_frame_model
+from aerial_planner.kinematics.inverse_kinematics import InverseKinematics
+from aerial_planner.motion.schedule import contact_schedule, load_motion
+from aerial_planner.reference.body import body_reference
+from aerial_planner.refinement import Attempt, Outcome
 
 from .conftest import jump
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from aerial_model.errors import RefusalCode, RefusalError
-from aerial_model.robot import BASE_POSITION, JOINT_POSITION
-from aerial_model.terrain import Terrain
-from aerial_planner.collision import CollisionModel
+from aerial_model.robot.robot import BASE_POSITION, JOINT_POSITION
+from aerial_model.values.terrain import Terrain
+from aerial_planner.assembly.collision import CollisionModel
 
 from .conftest import jump
 

@@ -9,12 +9,12 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from aerial_planner import vector_code
-from aerial_planner.compiled import CompilationError, FunctionLibrary
-from aerial_planner.interior_point import InteriorPoint
+from aerial_planner.codegen import c_source
+from aerial_planner.codegen.library import CompilationError, FunctionLibrary
+from aerial_planner.ocp.interior_point import InteriorPoint
+from aerial_planner.ocp.options import SolverOptions
+from aerial_planner.ocp.stage import Rows, StageKind
 from aerial_planner.planner import Planner
-from aerial_planner.solver import SolverOptions
-from aerial_planner.stage import Rows, StageKind
 
 from .conftest import jump
 
@@ -42,7 +42,7 @@ def evaluated(function, n, arguments, sizes):
 @pytest.mark.parametrize("block", [300, 7])  # operations: all in one, or values handed from one to the next
 @pytest.mark.parametrize("n", [1, 4, 6])  # points: some lanes left over, none, both
 def test_compiled_functions_give_the_interpreted_numbers_to_the_last_bit(library, kind, n, block, monkeypatch):
-    monkeypatch.setattr(vector_code, "_BLOCK", block)
+    monkeypatch.setattr(c_source, "_BLOCK", block)
     assert library.load(kind) is None
     assert library.compile(kind)
     rng = np.random.default_rng(0)

@@ -4,11 +4,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from aerial_model import rotation
-from aerial_model.robot import Robot
-from aerial_planner.flight import integrate_flight
-from aerial_planner.reference import FlightPath
-from aerial_planner.symbolic import base_frame_model
+from aerial_model.numerics import rotation
+from aerial_model.robot.robot import Robot
+from aerial_planner.assembly.flight import integrate_flight
+from aerial_planner.kinematics.base_frame import base_frame_model
+from aerial_planner.reference.body import FlightPath
 
 T = 0.4  # [s]
 

@@ -4,9 +4,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from aerial_planner.solver import SolverName, SolverOptions
-from aerial_planner.stage import Rows, StageData
-from aerial_planner.transcription import Problem
+from aerial_planner.ocp.options import SolverName, SolverOptions
+from aerial_planner.ocp.problem import Problem
+from aerial_planner.ocp.stage import Rows, StageData
 
 NONE = ca.SX(0, 1)
 

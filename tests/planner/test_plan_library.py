@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from aerial_model.errors import ConfigurationError
-from aerial_model.plan_file import load_plan, save_plan
-from aerial_model.request import MotionRequest
-from aerial_planner.plan_library import PlanLibrary
+from aerial_model.values.plan_file import load_plan, save_plan
+from aerial_model.values.request import MotionRequest
+from aerial_planner.assembly.library import PlanLibrary
 
 from .conftest import jump
 

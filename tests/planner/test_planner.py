@@ -7,15 +7,15 @@ import pinocchio as pin
 import pytest
 import yaml
 
-from aerial_model import rotation
-from aerial_model.contact import friction_pyramid
 from aerial_model.errors import InvalidPlanError, RefusalCode, RefusalError
-from aerial_model.request import MotionRequest
-from aerial_model.robot import BASE_ORIENTATION, Robot
-from aerial_model.state import Estimate
-from aerial_model.terrain import Terrain
+from aerial_model.numerics import rotation
+from aerial_model.robot.contact import friction_pyramid
+from aerial_model.robot.robot import BASE_ORIENTATION, Robot
+from aerial_model.values.estimate import Estimate
+from aerial_model.values.request import MotionRequest
+from aerial_model.values.terrain import Terrain
+from aerial_planner.ocp.options import SolverName
 from aerial_planner.planner import Planner
-from aerial_planner.solver import SolverName
 
 from .conftest import jump
 

@@ -6,13 +6,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from aerial_model.request import MotionRequest
-from aerial_model.robot import Robot
-from aerial_planner.inverse_kinematics import InverseKinematics
-from aerial_planner.reference import body_reference
-from aerial_planner.schedule import contact_schedule, load_motion
+from aerial_model.robot.robot import Robot
+from aerial_model.values.request import MotionRequest
+from aerial_planner.kinematics.base_frame import base_frame_model
+from aerial_planner.kinematics.inverse_kinematics import InverseKinematics
+from aerial_planner.motion.schedule import contact_schedule, load_motion
+from aerial_planner.reference.body import body_reference
 from aerial_planner.settings import PlannerSettings
-from aerial_planner.symbolic import base_frame_model
 
 GOALS = [(0.0, 0.0, 0.0), (0.52, 0.0, 0.0), (0.0, 0.3, 0.0), (-0.2, 0.0, 0.0)]
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aerial_planner.riccati import LinearQuadratic
+from aerial_planner.ocp.riccati import LinearQuadratic
 
 
 def problem(seed, *, nx=(4, 5, 3, 4), nu=(3, 2, 3, 0), nc=(4, 3, 1, 2)):

@@ -6,9 +6,9 @@ import pytest
 from adam.casadi import KinDynComputations
 from adam.core.constants import Representations
 
-from aerial_model import rotation
-from aerial_planner import symbolic
-from aerial_planner.symbolic import base_frame_model
+from aerial_model.numerics import rotation
+from aerial_planner.kinematics import base_frame
+from aerial_planner.kinematics.base_frame import base_frame_model
 
 TOLERANCE = 1e-12
 
@@ -69,5 +69,5 @@ def test_angular_momentum_agrees_with_adam(robot, model, joints):
 @pytest.mark.parametrize("size", [0.0, 1e-6, 0.1, 1.0])
 def test_quaternion_step_is_the_exponential(size):
     omega = size * np.array([0.6, -0.64, 0.48])
-    step = np.asarray(symbolic.quaternion_step(omega, 1.0)).ravel()
+    step = np.asarray(base_frame.quaternion_step(omega, 1.0)).ravel()
     np.testing.assert_allclose(step, rotation.exp(omega), atol=1e-10)

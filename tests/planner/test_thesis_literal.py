@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from aerial_model.request import MotionRequest
-from aerial_planner.inverse_kinematics import InverseKinematics
-from aerial_planner.kino_dynamic import KinoDynamic
-from aerial_planner.limits import Variant
-from aerial_planner.reference import body_reference
-from aerial_planner.schedule import contact_schedule, load_motion
+from aerial_model.values.request import MotionRequest
+from aerial_planner.formulation.kino_dynamic import KinoDynamic
+from aerial_planner.formulation.limits import Variant
+from aerial_planner.formulation.srbm import SingleRigidBody
+from aerial_planner.formulation.thesis_literal import LiteralProblem
+from aerial_planner.kinematics.base_frame import base_frame_model
+from aerial_planner.kinematics.inverse_kinematics import InverseKinematics
+from aerial_planner.motion.schedule import contact_schedule, load_motion
+from aerial_planner.ocp.options import SolverOptions
+from aerial_planner.reference.body import body_reference
 from aerial_planner.settings import PlannerSettings
-from aerial_planner.solver import SolverOptions
-from aerial_planner.srbm import SingleRigidBody
-from aerial_planner.symbolic import base_frame_model
-from aerial_planner.thesis_literal import LiteralProblem
 
 from .conftest import jump
 

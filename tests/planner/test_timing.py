@@ -5,14 +5,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from aerial_model import rotation
 from aerial_model.config import from_mapping
 from aerial_model.errors import ConfigurationError
-from aerial_model.request import MotionRequest
-from aerial_model.robot import BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY
-from aerial_planner.plan_library import PlanLibrary
-from aerial_planner.reference import body_reference
-from aerial_planner.schedule import Phase, load_motion
+from aerial_model.numerics import rotation
+from aerial_model.robot.robot import BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY
+from aerial_model.values.request import MotionRequest
+from aerial_planner.assembly.library import PlanLibrary
+from aerial_planner.motion.schedule import Phase, load_motion
+from aerial_planner.reference.body import body_reference
 from aerial_planner.settings import PlannerSettings
 
 from .conftest import jump

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from aerial_planner.nlp import FlatProgram
-from aerial_planner.solver import SolverName, SolverOptions
-from aerial_planner.stage import Rows, StageData
-from aerial_planner.transcription import Problem
+from aerial_planner.ocp.casadi_nlp import FlatProgram
+from aerial_planner.ocp.options import SolverName, SolverOptions
+from aerial_planner.ocp.problem import Problem
+from aerial_planner.ocp.stage import Rows, StageData
 
 DT, N = 0.1, 60
 A = np.array([[1.0, DT], [0.0, 1.0]])

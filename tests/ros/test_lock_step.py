@@ -5,14 +5,14 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool
 
-from aerial_evaluation.landing import OBSERVE_TIME, Tick, judge
-from aerial_model.request import MotionRequest
-from aerial_model.robot import Robot
-from aerial_model.ros import qos
-from aerial_model.ros.messages import from_stamp, plan_from_message, selection_to_message
+from aerial_evaluation.judgement.landing import OBSERVE_TIME, Tick, judge
+from aerial_model.robot.robot import Robot
+from aerial_model.values.request import MotionRequest
 from aerial_msgs.msg import GroundTruth, JointCommand, MotionPlan, MotionResult, MotionSelection, RobotState
 from aerial_msgs.srv import Step
 from aerial_planner.ros.planner_node import PlannerNode
+from aerial_ros import qos
+from aerial_ros.messages import from_stamp, plan_from_message, selection_to_message
 from aerial_sim.ros.messages import ground_truth_from_message
 from aerial_sim.ros.sim_node import SimNode
 from aerial_sim.simulation import CONTROL_DT

@@ -10,15 +10,15 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 
-from aerial_model.request import ControllerCommand, MotionRequest
-from aerial_model.robot import Robot
-from aerial_model.ros import qos
-from aerial_model.ros.messages import plan_from_message, result_to_message, selection_to_message, to_stamp
+from aerial_model.robot.robot import Robot
+from aerial_model.values.request import ControllerCommand, MotionRequest
 from aerial_msgs.action import PlanMotion
 from aerial_msgs.msg import MotionPlan, MotionResult, MotionSelection, TerrainBox
 from aerial_planner.planner import Planner
 from aerial_planner.ros import planner_node
 from aerial_planner.ros.planner_node import PlannerNode
+from aerial_ros import qos
+from aerial_ros.messages import plan_from_message, result_to_message, selection_to_message, to_stamp
 
 PATIENCE = 60.0  # [s] for a plan on a busy machine, its problems not built yet
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6  # action_msgs/GoalStatus

@@ -10,16 +10,16 @@ import pytest
 import yaml
 
 from aerial_model.errors import RefusalCode, RefusalError
-from aerial_model.request import MotionRequest
-from aerial_model.robot import Robot
-from aerial_model.robot_file import known_robots
-from aerial_model.ros import qos
+from aerial_model.robot.loading import known_robots
+from aerial_model.robot.robot import Robot
+from aerial_model.values.request import MotionRequest
 from aerial_msgs.msg import ControllerStatus, MotionPlan
 from aerial_operator import client as operator_client
 from aerial_operator.client import connected
-from aerial_operator.nodes import PLANNER, PROGRAMS, SIMULATOR, NodeProcesses, parameters
-from aerial_operator.recording import Recorder
-from aerial_operator.trial import execution, judged
+from aerial_operator.processes import PLANNER, PROGRAMS, SIMULATOR, NodeProcesses, parameters
+from aerial_operator.recording.recorder import Recorder
+from aerial_operator.recording.trial import execution, judged
+from aerial_ros import qos
 from aerial_sim.ros.messages import ground_truth_from_message
 
 PATIENCE = 120.0  # [s] for anything to happen on a busy machine

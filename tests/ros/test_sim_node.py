@@ -10,15 +10,15 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
-from aerial_model.request import MotionRequest
-from aerial_model.robot import Robot
-from aerial_model.ros import qos
-from aerial_model.ros.messages import selection_to_message
-from aerial_model.ros.wire import CommandWire
-from aerial_model.state import Command
-from aerial_model.terrain import Terrain
+from aerial_model.robot.robot import Robot
+from aerial_model.values.command import Command
+from aerial_model.values.request import MotionRequest
+from aerial_model.values.terrain import Terrain
 from aerial_msgs.msg import GroundTruth, JointCommand, MotionResult, MotionSelection, RobotState
 from aerial_msgs.srv import Disturb, Reset, Step
+from aerial_ros import qos
+from aerial_ros.messages import selection_to_message
+from aerial_ros.wire import CommandWire
 from aerial_sim.ros.messages import ground_truth_from_message
 from aerial_sim.ros.sim_node import SimNode
 

@@ -9,10 +9,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
-from aerial_model.request import MotionRequest
-from aerial_model.robot import Robot
-from aerial_model.ros import qos
-from aerial_model.ros.messages import plan_to_message, selection_to_message
+from aerial_model.robot.robot import Robot
+from aerial_model.values.request import MotionRequest
 from aerial_msgs.msg import (
     ControllerStatus,
     GroundTruth,
@@ -23,8 +21,10 @@ from aerial_msgs.msg import (
     RobotState,
 )
 from aerial_planner.planner import Planner
+from aerial_ros import qos
+from aerial_ros.messages import plan_to_message, selection_to_message
 from aerial_sim.ros.sim_node import SimNode
-from aerial_wbic.phase import Phase
+from aerial_wbic.behaviours.phase import Phase
 from aerial_wbic.ros.wbic_node import WbicNode
 
 PATIENCE = 60.0  # [s] a motion in lock-step on a busy machine

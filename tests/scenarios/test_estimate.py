@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from aerial_evaluation.closed_loop import run
-from aerial_evaluation.consistency import PHASES, summary
-from aerial_model.request import MotionRequest
-from aerial_model.robot import Robot
+from aerial_evaluation.judgement.consistency import PHASES, summary
+from aerial_model.robot.robot import Robot
+from aerial_model.values.request import MotionRequest
 from aerial_planner.planner import Planner
 
 SEEDS = 4

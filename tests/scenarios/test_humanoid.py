@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from aerial_evaluation import closed_loop
-from aerial_model.request import MotionRequest
-from aerial_model.robot import Robot
+from aerial_model.robot.robot import Robot
+from aerial_model.values.request import MotionRequest
 from aerial_planner.planner import Planner
 
 GOALS = {

@@ -5,8 +5,8 @@ import pytest
 
 from aerial_evaluation.closed_loop import run
 from aerial_model.errors import RefusalError
-from aerial_model.request import MotionRequest
-from aerial_model.robot import Robot
+from aerial_model.robot.robot import Robot
+from aerial_model.values.request import MotionRequest
 from aerial_planner.planner import Planner
 
 

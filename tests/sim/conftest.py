@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from aerial_model.robot import Robot
-from aerial_model.state import Command
+from aerial_model.robot.robot import Robot
+from aerial_model.values.command import Command
 
 HOLD_STIFFNESS = 100.0  # [N·m/rad] stiff enough to stand with
 HOLD_DAMPING = 2.0  # [N·m·s/rad]

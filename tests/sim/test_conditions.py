@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from aerial_model.kinematics import Kinematics
-from aerial_model.robot import BASE_POSITION, Robot
-from aerial_model.state import Command
+from aerial_model.robot.robot import BASE_POSITION, Robot
+from aerial_model.values.command import Command
 from aerial_sim.conditions import Conditions
 from aerial_sim.simulation import Simulation
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from aerial_model.terrain import Terrain
-from aerial_sim.drive import Drive
+from aerial_model.values.terrain import Terrain
+from aerial_sim.robot_side.motor_board import Drive
 from aerial_sim.simulation import Simulation
 
 NO_LOAD_SPEED = {"abad": 40.0, "hip": 40.0, "knee": 25.72}  # [rad/s] 24 V over k_e g_r

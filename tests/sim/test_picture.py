@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from aerial_model import rotation
-from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION
-from aerial_model.terrain import Box, Terrain
-from aerial_sim.picture import Footage, frames, save, save_animation, strobe
-from aerial_sim.raycast import SUN_DIRECTION, Camera, render
-from aerial_sim.still_life import compose
+from aerial_model.numerics import rotation
+from aerial_model.robot.robot import BASE_ORIENTATION, BASE_POSITION
+from aerial_model.values.terrain import Box, Terrain
+from aerial_sim.picture.picture import Footage, frames, save, save_animation, strobe
+from aerial_sim.picture.raycast import SUN_DIRECTION, Camera, render
+from aerial_sim.picture.still_life import compose
 
 WIDTH, HEIGHT = 96, 54  # [pixel]
 TAKE_OFF, LANDING = 0.2, 0.5  # [s]

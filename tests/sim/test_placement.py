@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from aerial_model import rotation
-from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION
-from aerial_model.terrain import GAP_DEPTH, Box, Terrain
-from aerial_sim.placement import placed_ahead
+from aerial_model.numerics import rotation
+from aerial_model.robot.robot import BASE_ORIENTATION, BASE_POSITION
+from aerial_model.values.terrain import GAP_DEPTH, Box, Terrain
+from aerial_sim.world.placement import placed_ahead
 
 AHEAD = Terrain(boxes=(Box(centre=[0.8, 0.0, 0.1], size=[0.6, 0.9, 0.2]),))
 

@@ -3,10 +3,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from aerial_model import rotation
 from aerial_model.errors import ConfigurationError
-from aerial_model.robot import Robot
-from aerial_sim.sensors import SensorNoise, Sensors
+from aerial_model.numerics import rotation
+from aerial_model.robot.robot import Robot
+from aerial_sim.robot_side.sensors import SensorNoise, Sensors
 
 SAMPLES = 4000
 LAW = Robot.load("mini_cheetah").actuators

@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from aerial_sim.session import HOLD_TICKS, Session
+from aerial_sim.robot_side.session import HOLD_TICKS, Session
 from aerial_sim.simulation import Simulation
 
 

@@ -3,12 +3,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from aerial_model import rotation
 from aerial_model.errors import ConfigurationError
 from aerial_model.kinematics import Kinematics
-from aerial_model.robot import BASE_ORIENTATION, JOINT_POSITION
-from aerial_model.state import Measurement
-from aerial_model.terrain import Box, Terrain
+from aerial_model.numerics import rotation
+from aerial_model.robot.robot import BASE_ORIENTATION, JOINT_POSITION
+from aerial_model.values.measurement import Measurement
+from aerial_model.values.terrain import Box, Terrain
 from aerial_sim.conditions import Conditions
 from aerial_sim.simulation import Simulation
 

@@ -6,14 +6,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from aerial_model import rotation
 from aerial_model.kinematics import Kinematics, factorize
-from aerial_model.plan import Plan
-from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, JOINT_POSITION, JOINT_VELOCITY, Robot
+from aerial_model.numerics import rotation
+from aerial_model.robot.robot import BASE_ORIENTATION, BASE_POSITION, JOINT_POSITION, JOINT_VELOCITY, Robot
+from aerial_model.values.plan import Plan
 from aerial_wbic.gains import ControllerGains
-from aerial_wbic.hierarchy import decided, priorities, subordinate
 from aerial_wbic.target import blank_target
-from aerial_wbic.tasks import command
+from aerial_wbic.tasks.hierarchy import decided, priorities, subordinate
+from aerial_wbic.tasks.tasks import command
 
 GRAVITY = 9.81  # [m/s²]
 DT = 0.01  # between knots [s]

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from aerial_model.kinematics import Kinematics
-from aerial_model.robot import Robot
+from aerial_model.robot.robot import Robot
+from aerial_wbic.force_qp.solvers import blank_program
 from aerial_wbic.gains import ControllerGains
-from aerial_wbic.qp_solvers import blank_program
 from aerial_wbic.target import blank_target
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aerial_model.compiled import cholesky, cholesky_solve, invert
-from aerial_model.plan_file import save_plan
+from aerial_model.numerics.linalg import cholesky, cholesky_solve, invert
+from aerial_model.values.plan_file import save_plan
 
 ROUNDING = 1e-10
 TICKS_OF_EVERYTHING = Path(__file__).with_name("ticks_of_everything.py")

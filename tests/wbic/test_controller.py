@@ -7,13 +7,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from aerial_evaluation.landing import OBSERVE_TIME, Tick, judge
-from aerial_model import rotation
+from aerial_evaluation.judgement.landing import OBSERVE_TIME, Tick, judge
 from aerial_model.errors import InvalidPlanError, RefusalCode, RefusalError
-from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, BASE_TWIST, Robot
+from aerial_model.numerics import rotation
+from aerial_model.robot.robot import BASE_ORIENTATION, BASE_POSITION, BASE_TWIST, Robot
 from aerial_sim.simulation import Simulation
+from aerial_wbic.behaviours.phase import Phase
 from aerial_wbic.controller import Controller
-from aerial_wbic.phase import Phase
 
 PERIOD = 0.002  # [s]
 STAND_TIME = 0.5  # [s]

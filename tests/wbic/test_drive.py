@@ -9,11 +9,11 @@ import pinocchio as pin
 import pytest
 
 from aerial_model.kinematics import Kinematics
-from aerial_model.robot import JOINT_VELOCITY, Robot
-from aerial_model.state import Measurement
-from aerial_wbic.drive import Drive
+from aerial_model.robot.robot import JOINT_VELOCITY, Robot
+from aerial_model.values.measurement import Measurement
+from aerial_wbic.force_qp.optimization import ForceOptimization
 from aerial_wbic.gains import ControllerGains
-from aerial_wbic.qp import ForceOptimization
+from aerial_wbic.joint_command import Drive
 from aerial_wbic.target import PostureTarget
 
 ACCELERATION_TOLERANCE = 1e-6  # [m/s²], [rad/s²]

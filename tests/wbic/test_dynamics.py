@@ -8,12 +8,12 @@ import pinocchio as pin
 import pytest
 
 from aerial_model.kinematics import Kinematics
-from aerial_model.robot import BASE_ANGULAR, BASE_LINEAR, JOINT_POSITION, JOINT_VELOCITY
-from aerial_model.terrain import Terrain
-from aerial_sim import world
-from aerial_wbic.qp import ForceOptimization
-from aerial_wbic.support import shared_load
-from aerial_wbic.tasks import Limbs, arrangement_block
+from aerial_model.robot.robot import BASE_ANGULAR, BASE_LINEAR, JOINT_POSITION, JOINT_VELOCITY
+from aerial_model.values.terrain import Terrain
+from aerial_sim.world import world
+from aerial_wbic.behaviours.support import shared_load
+from aerial_wbic.force_qp.optimization import ForceOptimization
+from aerial_wbic.tasks.tasks import Limbs, arrangement_block
 
 TOLERANCE = 1e-6  # relative to the largest acceleration
 PHYSICS_DT = 0.001  # [s]

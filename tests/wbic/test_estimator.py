@@ -8,11 +8,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from aerial_model import rotation
 from aerial_model.kinematics import Kinematics
-from aerial_model.robot import BASE_ANGULAR, BASE_LINEAR, BASE_ORIENTATION, BASE_POSITION
-from aerial_model.state import Measurement
-from aerial_wbic.estimator import Estimator
+from aerial_model.numerics import rotation
+from aerial_model.robot.robot import BASE_ANGULAR, BASE_LINEAR, BASE_ORIENTATION, BASE_POSITION
+from aerial_model.values.measurement import Measurement
+from aerial_wbic.estimation.estimator import Estimator
 
 DT = 0.002  # [s]
 GRAVITY = np.array([0.0, 0.0, -9.81])  # [m/s²]

@@ -8,7 +8,7 @@ import pytest
 
 from aerial_model.config import from_mapping
 from aerial_model.errors import ConfigurationError
-from aerial_model.scale import Scale
+from aerial_model.robot.scale import Scale
 from aerial_wbic.controller import Controller
 from aerial_wbic.gains import ControllerGains, EstimatorNoise
 

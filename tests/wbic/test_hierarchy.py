@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerial_wbic.hierarchy import Task, owned_rows
+from aerial_wbic.tasks.hierarchy import Task, owned_rows
 
 NV = 10
 TOLERANCE = 1e-7  # relative to tasks and accelerations of order 1

@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from aerial_model.robot import JOINT_VELOCITY
+from aerial_model.robot.robot import JOINT_VELOCITY
+from aerial_wbic.behaviours.phase import Phase, Phases
 from aerial_wbic.gains import Touchdown
-from aerial_wbic.phase import Phase, Phases
 
 
 @pytest.mark.parametrize(("late", "share"), [(-0.004, 1.0), (0.0, 1.0), (0.004, 0.0), (0.02, 0.0)])

@@ -9,13 +9,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import nnls
 
-from aerial_model.contact import friction_pyramid
-from aerial_model.robot import BASE_TWIST
-from aerial_wbic import qp_solvers
+from aerial_model.robot.contact import friction_pyramid
+from aerial_model.robot.robot import BASE_TWIST
+from aerial_wbic.behaviours.support import shared_load
+from aerial_wbic.force_qp import solvers
+from aerial_wbic.force_qp.optimization import ForceOptimization, Room
+from aerial_wbic.force_qp.solvers import SOLVERS
 from aerial_wbic.gains import QpSolver
-from aerial_wbic.qp import ForceOptimization, Room
-from aerial_wbic.qp_solvers import SOLVERS
-from aerial_wbic.support import shared_load
 
 EQUATION_TOLERANCE = 1e-8  # [N], [N·m]
 FORCE_TOLERANCE = 0.1  # that a force may leave the pyramid [N]
@@ -221,8 +221,8 @@ def test_a_state_that_is_no_number_raises_nothing(optimization, state_at):
 
 @pytest.mark.parametrize("name", ["Osqp", "Daqp"])
 def test_the_fallback_keeps_the_pyramid_and_the_equations_of_motion(robot, gains, state_at, monkeypatch, name):
-    monkeypatch.setattr(f"aerial_wbic.qp_solvers.{name}.minimum", lambda *_: None)
-    optimization = ForceOptimization(robot, gains.weight_base, gains.weight_force, getattr(qp_solvers, name))
+    monkeypatch.setattr(f"aerial_wbic.force_qp.solvers.{name}.minimum", lambda *_: None)
+    optimization = ForceOptimization(robot, gains.weight_base, gains.weight_force, getattr(solvers, name))
     state = state_at(2)
     vdot_cmd, f_cmd = problem(state, 2)
     solution = optimization.solve(state, vdot_cmd, f_cmd, np.ones(4, dtype=bool))

@@ -7,8 +7,8 @@ import dataclasses
 import pytest
 
 from aerial_model.errors import InvalidPlanError, RefusalCode, RefusalError
-from aerial_model.request import ControllerCommand
-from aerial_wbic.phase import Phase
+from aerial_model.values.request import ControllerCommand
+from aerial_wbic.behaviours.phase import Phase
 from aerial_wbic.requests import Outcome, Requests
 
 

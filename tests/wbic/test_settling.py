@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerial_wbic.settling import REACH, TIME, settled, settling
+from aerial_wbic.behaviours.settling import REACH, TIME, settled, settling
 
 STEP = 1e-6  # of finite differences [s]
 TIMES = np.linspace(0.0, 2.0, 2001)

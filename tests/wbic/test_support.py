@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from aerial_model import rotation
-from aerial_wbic.support import shared_load, supported
+from aerial_model.numerics import rotation
+from aerial_wbic.behaviours.support import shared_load, supported
 
 GRAVITY = 9.81  # [m/s²]
 FORCE_TOLERANCE = 0.05  # [N], the regularization's part

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from aerial_model import rotation
-from aerial_model.robot import BASE_ANGULAR
-from aerial_wbic.support import support_centre, supported
+from aerial_model.numerics import rotation
+from aerial_model.robot.robot import BASE_ANGULAR
+from aerial_wbic.behaviours.support import support_centre, supported
 from aerial_wbic.target import Fold, Following, Hold
 
 

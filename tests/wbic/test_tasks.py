@@ -8,13 +8,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from aerial_model import rotation
 from aerial_model.kinematics import Kinematics
-from aerial_model.robot import JOINT_POSITION, JOINT_VELOCITY, Robot
+from aerial_model.numerics import rotation
+from aerial_model.robot.robot import JOINT_POSITION, JOINT_VELOCITY, Robot
 from aerial_wbic.gains import ControllerGains, TaskOrder, TaskWeights
-from aerial_wbic.hierarchy import Task, agreed, compromise, weigh_in
 from aerial_wbic.target import blank_target
-from aerial_wbic.tasks import (
+from aerial_wbic.tasks.hierarchy import Task, agreed, compromise, weigh_in
+from aerial_wbic.tasks.tasks import (
     Limbs,
     Statement,
     angular_momentum_task,

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from aerial_model.kinematics import Kinematics
-from aerial_model.robot import JOINT_VELOCITY
+from aerial_model.robot.robot import JOINT_VELOCITY
 from aerial_sim.conditions import Conditions
 from aerial_sim.simulation import Simulation
+from aerial_wbic.behaviours.phase import Phase
 from aerial_wbic.controller import Controller
+from aerial_wbic.estimation.touchdown import ContactSense
 from aerial_wbic.gains import TouchdownSensing
-from aerial_wbic.phase import Phase
-from aerial_wbic.touchdown import ContactSense
 
 PERIOD = 0.002  # [s]
 STAND_TIME = 0.5  # [s]

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 
-from aerial_model.plan import Plan
-from aerial_model.plan_file import load_plan
-from aerial_model.robot import BASE_POSITION, Robot
+from aerial_model.robot.robot import BASE_POSITION, Robot
+from aerial_model.values.plan import Plan
+from aerial_model.values.plan_file import load_plan
 from aerial_sim.simulation import Simulation
 from aerial_wbic.controller import Controller
 

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from aerial_evaluation import consistency, tracking
-from aerial_evaluation.landing import OBSERVE_TIME, Landing, Tick, judge
-from aerial_model.plan import Plan
-from aerial_model.request import MotionRequest
-from aerial_model.robot import Robot
-from aerial_model.terrain import Terrain
+from aerial_evaluation.judgement import consistency, tracking
+from aerial_evaluation.judgement.landing import OBSERVE_TIME, Landing, Tick, judge
+from aerial_model.robot.robot import Robot
+from aerial_model.values.plan import Plan
+from aerial_model.values.request import MotionRequest
+from aerial_model.values.terrain import Terrain
 from aerial_planner.planner import Planner, PlanningResult, Progress
 from aerial_sim.conditions import Conditions
 from aerial_sim.simulation import AS_EXPECTED, Simulation

@@ -15,13 +15,13 @@ import numpy as np
 import pinocchio as pin
 
 from aerial_model.errors import AerialError
-from aerial_model.posture import crouch_depth
-from aerial_model.robot import JOINT_POSITION, JOINT_VELOCITY, Robot
-from aerial_model.robot_description import resolved
-from aerial_model.robot_file import find_folder
-from aerial_model.terrain import Terrain
-from aerial_planner.collision import CollisionModel
-from aerial_sim.world import build
+from aerial_model.robot.loading import find_folder
+from aerial_model.robot.posture import crouch_depth
+from aerial_model.robot.robot import JOINT_POSITION, JOINT_VELOCITY, Robot
+from aerial_model.robot.urdf import resolved
+from aerial_model.values.terrain import Terrain
+from aerial_planner.assembly.collision import CollisionModel
+from aerial_sim.world.world import build
 from aerial_wbic.controller import Controller
 
 ERROR, WARNING, NOTE = "error", "warning", "note"

@@ -11,14 +11,10 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from aerial_model.block import cut, cut_rows
-from aerial_model.compiled import ZERO, compiled, cross_of, sum_of
-from aerial_model.robot import (
-    BASE_ORIENTATION,
-    GRAVITY,
-    JOINT_VELOCITY,
-    Robot,
-)
+from aerial_model.numerics.components import ZERO, cross_of, sum_of
+from aerial_model.numerics.jit import compiled
+from aerial_model.numerics.layout import cut, cut_rows
+from aerial_model.robot.robot import BASE_ORIENTATION, GRAVITY, JOINT_VELOCITY, Robot
 
 _N, _N_C, _MASS, _HEADER = range(4)  # where a block says how many joints and contact points there are, and the mass
 

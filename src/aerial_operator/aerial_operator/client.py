@@ -16,12 +16,12 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from aerial_model.errors import RefusalCode, RefusalError
-from aerial_model.request import ControllerCommand, MotionRequest
-from aerial_model.ros import qos
-from aerial_model.ros.messages import code_from_message, from_stamp, outcome_from_message, selection_to_message
+from aerial_model.values.request import ControllerCommand, MotionRequest
 from aerial_msgs.msg import ControllerStatus, MotionResult, MotionSelection
 from aerial_msgs.srv import Reset
-from aerial_operator.nodes import CONTROLLER, PLANNER, PROGRAMS, SIMULATOR, NodeProgram
+from aerial_operator.processes import CONTROLLER, PLANNER, PROGRAMS, SIMULATOR, NodeProgram
+from aerial_ros import qos
+from aerial_ros.messages import code_from_message, from_stamp, outcome_from_message, selection_to_message
 
 WARMING_UP = "warming up"  # how the planner's diagnostics begin then
 DISCOVERY_TIMEOUT = 8.0  # for a listener to be found, on a machine whose cores are busy [s]

@@ -11,38 +11,34 @@ from typing import Any
 
 import numpy as np
 
-from aerial_model import rotation
 from aerial_model.errors import ConfigurationError, RefusalCode, RefusalError
-from aerial_model.plan import Plan
-from aerial_model.request import MotionRequest
-from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, JOINT_POSITION, Robot
-from aerial_model.state import Estimate
-from aerial_planner import flight, interior_point
-from aerial_planner.assembly import ActuatorUse, actuator_use, assemble, with_held_joints
-from aerial_planner.attempt import Attempt, Outcome
-from aerial_planner.checks import (
-    ACTUATOR_TOLERANCE,
-    VIOLATION_TOLERANCE,
-    check,
-    clearance_deficit,
-)
-from aerial_planner.collision import CollisionModel
-from aerial_planner.compiled import FunctionLibrary
-from aerial_planner.in_place import no_machine_code
-from aerial_planner.inverse_kinematics import InverseKinematics
-from aerial_planner.kino_dynamic import KinoDynamic
-from aerial_planner.limits import Margin, Variant
-from aerial_planner.plan_library import PlanLibrary
-from aerial_planner.reference import Reference, body_reference
-from aerial_planner.schedule import Motion, Schedule, contact_schedule, load_motion
-from aerial_planner.screen import screen
+from aerial_model.numerics import rotation
+from aerial_model.robot.robot import BASE_ORIENTATION, BASE_POSITION, JOINT_POSITION, Robot
+from aerial_model.values.estimate import Estimate
+from aerial_model.values.plan import Plan
+from aerial_model.values.request import MotionRequest
+from aerial_planner.assembly import flight
+from aerial_planner.assembly.assemble import ActuatorUse, actuator_use, assemble, with_held_joints
+from aerial_planner.assembly.checks import ACTUATOR_TOLERANCE, VIOLATION_TOLERANCE, check, clearance_deficit
+from aerial_planner.assembly.collision import CollisionModel
+from aerial_planner.assembly.library import PlanLibrary
+from aerial_planner.codegen.batch import no_machine_code
+from aerial_planner.codegen.library import FunctionLibrary
+from aerial_planner.feasibility import screen
+from aerial_planner.formulation.kino_dynamic import KinoDynamic
+from aerial_planner.formulation.limits import Margin, Variant
+from aerial_planner.formulation.srbm import SingleRigidBody
+from aerial_planner.formulation.trajectory import TakeOffTrajectory
+from aerial_planner.kinematics.base_frame import base_frame_model
+from aerial_planner.kinematics.inverse_kinematics import InverseKinematics
+from aerial_planner.motion.schedule import Motion, Schedule, contact_schedule, load_motion
+from aerial_planner.ocp import interior_point
+from aerial_planner.ocp.options import SolverName, SolverOptions
+from aerial_planner.ocp.problem import Solution
+from aerial_planner.ocp.stage import StageKind
+from aerial_planner.reference.body import Reference, body_reference
+from aerial_planner.refinement import Attempt, Outcome
 from aerial_planner.settings import PlannerSettings
-from aerial_planner.solver import SolverName, SolverOptions
-from aerial_planner.srbm import SingleRigidBody
-from aerial_planner.stage import StageKind
-from aerial_planner.symbolic import base_frame_model
-from aerial_planner.trajectory import TakeOffTrajectory
-from aerial_planner.transcription import Solution
 
 _TOLERANCE = 3e-4  # of the optimum: tighter ones cost two iterations and gain a hundred-thousandth of the cost
 _BARRIER_ACCURACY = 300.0  # of our own solver: a tenth fewer iterations of rolls and flips than with the others' 100

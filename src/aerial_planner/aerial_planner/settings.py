@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from aerial_model.scale import Scale, Unit
+from aerial_model.robot.scale import Scale, Unit
 
 CONTROL_PERIOD = 0.002  # [s] for which a controller holds its torques: contacts that end within one push too long
 _UNITS = {

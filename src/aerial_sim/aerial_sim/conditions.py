@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
-from aerial_sim.world import FRICTION_COEFFICIENT
+from aerial_sim.world.world import FRICTION_COEFFICIENT
 
 PHYSICS_STEP = 0.0005  # [s]
 

@@ -13,10 +13,11 @@ from collections import deque
 import mujoco
 import numpy as np
 
-from aerial_model import rotation
-from aerial_model.compiled import compiled, matrix_of
 from aerial_model.errors import ConfigurationError
-from aerial_model.robot import (
+from aerial_model.numerics import rotation
+from aerial_model.numerics.components import matrix_of
+from aerial_model.numerics.jit import compiled
+from aerial_model.robot.robot import (
     BASE_ANGULAR,
     BASE_LINEAR,
     BASE_ORIENTATION,
@@ -25,14 +26,15 @@ from aerial_model.robot import (
     JOINT_VELOCITY,
     Robot,
 )
-from aerial_model.state import Command, Measurement
-from aerial_model.terrain import Terrain
+from aerial_model.values.command import Command
+from aerial_model.values.measurement import Measurement
+from aerial_model.values.terrain import Terrain
 from aerial_sim.conditions import Conditions
-from aerial_sim.contacts import ContactSensing
-from aerial_sim.drive import Drive
 from aerial_sim.ground_truth import GroundTruth
-from aerial_sim.sensors import SensorNoise, Sensors
-from aerial_sim.world import World, build
+from aerial_sim.robot_side.motor_board import Drive
+from aerial_sim.robot_side.sensors import SensorNoise, Sensors
+from aerial_sim.world.contacts import ContactSensing
+from aerial_sim.world.world import World, build
 
 CONTROL_DT = 0.002  # [s]
 FLAT = Terrain()

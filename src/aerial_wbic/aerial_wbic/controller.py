@@ -12,23 +12,25 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from aerial_model import rotation
 from aerial_model.errors import RefusalCode, RefusalError
 from aerial_model.kinematics import Configuration, Kinematics
-from aerial_model.plan import Plan, Track
-from aerial_model.posture import crouch_depth
-from aerial_model.robot import BASE_ORIENTATION, BASE_POSITION, GRAVITY, JOINT_POSITION, Robot
-from aerial_model.state import Command, Estimate, Measurement
-from aerial_wbic.acceptance import check_start
-from aerial_wbic.drive import Drive
-from aerial_wbic.estimator import Estimator
+from aerial_model.numerics import rotation
+from aerial_model.robot.posture import crouch_depth
+from aerial_model.robot.robot import BASE_ORIENTATION, BASE_POSITION, GRAVITY, JOINT_POSITION, Robot
+from aerial_model.values.command import Command
+from aerial_model.values.estimate import Estimate
+from aerial_model.values.measurement import Measurement
+from aerial_model.values.plan import Plan, Track
+from aerial_wbic.behaviours.acceptance import check_start
+from aerial_wbic.behaviours.phase import FOLLOWING, Phase, Phases
+from aerial_wbic.estimation.estimator import Estimator
+from aerial_wbic.estimation.touchdown import ContactSense
+from aerial_wbic.force_qp.optimization import ForceOptimization
+from aerial_wbic.force_qp.solvers import SOLVERS
 from aerial_wbic.gains import ControllerGains, Touchdown
-from aerial_wbic.phase import FOLLOWING, Phase, Phases
-from aerial_wbic.qp import ForceOptimization
-from aerial_wbic.qp_solvers import SOLVERS
+from aerial_wbic.joint_command import Drive
 from aerial_wbic.target import Fold, Following, PostureTarget, WholeBodyTarget
-from aerial_wbic.tasks import Limbs, arrangement_block, attitude_error, command
-from aerial_wbic.touchdown import ContactSense
+from aerial_wbic.tasks.tasks import Limbs, arrangement_block, attitude_error, command
 
 _DEPTH_SHARE = 0.85  # of the depth to which legs can bend that a landing may use
 

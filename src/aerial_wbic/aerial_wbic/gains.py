@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from aerial_model.config import load_yaml
-from aerial_model.scale import Scale, Unit
+from aerial_model.robot.scale import Scale, Unit
 
 _RATE = Unit(time=-1)
 # How numbers of gains.yaml grow with the robot. The estimator's are the sensors' and the floor's: they stay.

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from aerial_model.errors import InvalidPlanError, RefusalCode, RefusalError
-from aerial_model.plan import Plan
-from aerial_model.request import ControllerCommand
+from aerial_model.values.plan import Plan
+from aerial_model.values.request import ControllerCommand
+from aerial_wbic.behaviours.phase import Phase
 from aerial_wbic.controller import Controller
-from aerial_wbic.phase import Phase
 
 
 class Outcome(StrEnum):

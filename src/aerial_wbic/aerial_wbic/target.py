@@ -9,24 +9,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aerial_model import rotation
-from aerial_model.block import cut, cut_flags, cut_rows, flags_size
-from aerial_model.compiled import (
-    compiled,
-    exp_of,
-    inverse_of,
-    log_of,
-    matrix_of,
-    product_of,
-    quaternion,
-    vector,
-)
 from aerial_model.kinematics import Configuration, configuration_in
-from aerial_model.plan import Track, sampled
-from aerial_model.robot import BASE_ANGULAR, BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY
+from aerial_model.numerics import rotation
+from aerial_model.numerics.components import exp_of, inverse_of, log_of, matrix_of, product_of, quaternion, vector
+from aerial_model.numerics.jit import compiled
+from aerial_model.numerics.layout import cut, cut_flags, cut_rows, flags_size
+from aerial_model.robot.robot import BASE_ANGULAR, BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY
+from aerial_model.values.plan import Track, sampled
+from aerial_wbic.behaviours.settling import REACH, TIME, settled, settling
+from aerial_wbic.behaviours.support import shared_load, support_centre, supported
 from aerial_wbic.gains import BodyGains, Feedback
-from aerial_wbic.settling import REACH, TIME, settled, settling
-from aerial_wbic.support import shared_load, support_centre, supported
 
 REST_TOLERANCE = 0.2  # of the height at rest: farther off, something keeps the robot from standing
 

@@ -5,7 +5,7 @@ import pytest
 from aerial_evaluation.bench.controller import SECTIONS
 from aerial_evaluation.bench.planner import measured
 from aerial_evaluation.bench.subject import Subject
-from aerial_model.robot import Robot
+from aerial_model.robot.robot import Robot
 
 
 def rows_of(robot, folder):

@@ -6,7 +6,7 @@ from aerial_evaluation.bench.controller import SECTIONS
 from aerial_evaluation.bench.planner import measured
 from aerial_evaluation.bench.subject import Subject
 from aerial_evaluation.bench.ticks import PARTS
-from aerial_model.robot import Robot
+from aerial_model.robot.robot import Robot
 from aerial_wbic.gains import QpSolver, TaskOrder
 
 FORCE_TOLERANCE = 2.0  # between forces of two solvers [N]

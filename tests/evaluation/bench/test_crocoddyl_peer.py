@@ -10,7 +10,7 @@ import pytest
 from aerial_evaluation.bench.crocoddyl_peer import PEER, crocoddyl, problem
 from aerial_evaluation.bench.environment import Environment, PeerError
 from aerial_evaluation.bench.subject import Subject, usual_request
-from aerial_model.robot import JOINT_POSITION, Robot
+from aerial_model.robot.robot import JOINT_POSITION, Robot
 from aerial_planner.planner import Planner
 
 

@@ -9,9 +9,9 @@ import pytest
 from aerial_evaluation.bench.goals import SHARE, Family, draw, families, find_reach
 from aerial_evaluation.bench.subject import motions_of, usual_request
 from aerial_model.errors import RefusalError
-from aerial_model.request import MotionRequest
-from aerial_model.robot import Robot
-from aerial_planner.schedule import known_motions, motions_folder
+from aerial_model.robot.robot import Robot
+from aerial_model.values.request import MotionRequest
+from aerial_planner.motion.schedule import known_motions, motions_folder
 
 REACH = np.array([[-0.5, -1.0], [1.5, 1.0]])  # backward and forward ends along two axes
 

@@ -8,7 +8,7 @@ import pytest
 from aerial_evaluation.bench.reach import farthest
 from aerial_evaluation.bench.reach_figure import draw
 from aerial_model.errors import RefusalError
-from aerial_model.request import MotionRequest
+from aerial_model.values.request import MotionRequest
 
 BOUND = 2.0
 RESOLUTION = BOUND / 100

@@ -7,7 +7,7 @@ from PIL import Image
 from aerial_evaluation.bench.planner import measured
 from aerial_evaluation.bench.subject import Subject
 from aerial_model.errors import ConfigurationError, RefusalError
-from aerial_model.robot import Robot
+from aerial_model.robot.robot import Robot
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import pytest
 from aerial_evaluation.bench import memory, stored, timing
 from aerial_evaluation.bench.goals import families
 from aerial_evaluation.bench.subject import Subject
-from aerial_model.robot import Robot
+from aerial_model.robot.robot import Robot
 
 REACH = np.array([[-0.3, -0.3], [0.5, 0.3]])  # [m] of the goals below
 

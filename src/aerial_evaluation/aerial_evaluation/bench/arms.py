@@ -12,9 +12,9 @@ from aerial_evaluation import figures
 from aerial_evaluation.bench.samples import Row
 from aerial_evaluation.bench.subject import Subject, usual_request
 from aerial_evaluation.closed_loop import Outcome, run
-from aerial_model import rotation
 from aerial_model.kinematics import Kinematics
-from aerial_model.robot import BASE_TWIST, JOINT_POSITION, JOINT_VELOCITY, Robot
+from aerial_model.numerics import rotation
+from aerial_model.robot.robot import BASE_TWIST, JOINT_POSITION, JOINT_VELOCITY, Robot
 
 LANDING = 0.6  # after touchdown that counts as the landing [s]
 PARTS = {"base": "#8a8a8a", "legs": "#1f6f8b", "arms": "#c44e33"}

@@ -16,10 +16,10 @@ from aerial_evaluation.bench.environment import Environment, Peer
 from aerial_evaluation.bench.samples import Row, measure, percentiles, summary
 from aerial_evaluation.bench.scaling import KNOTS
 from aerial_evaluation.bench.subject import Subject, usual_request, usual_schedule
-from aerial_model.plan import Plan
-from aerial_model.robot import Robot
+from aerial_model.robot.robot import Robot
+from aerial_model.values.plan import Plan
+from aerial_planner.motion.schedule import load_motion
 from aerial_planner.planner import Planner
-from aerial_planner.schedule import load_motion
 from aerial_planner.settings import PlannerSettings
 
 PEER = Peer(

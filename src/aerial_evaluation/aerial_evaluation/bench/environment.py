@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from aerial_model.errors import AerialError
-from aerial_planner.compiled import default_cache
+from aerial_planner.codegen.library import default_cache
 
 
 class PeerError(AerialError):

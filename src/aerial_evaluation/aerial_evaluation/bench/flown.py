@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from aerial_evaluation.bench.samples import Row, Sample
-from aerial_evaluation.verification import verify
-from aerial_model.robot import Robot
+from aerial_evaluation.judgement.verification import verify
+from aerial_model.robot.robot import Robot
 
 
 def flown(robot: Robot, samples: Sequence[Sample]) -> Row:

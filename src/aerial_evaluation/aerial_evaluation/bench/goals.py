@@ -19,11 +19,11 @@ from aerial_evaluation.bench.flown import flown
 from aerial_evaluation.bench.samples import Row, Sample, measure, summary
 from aerial_evaluation.bench.subject import Subject
 from aerial_evaluation.bench.violations import violations
-from aerial_model.request import LOWER_MARGIN, UPPER_MARGIN, MotionRequest
-from aerial_model.robot import Robot
-from aerial_planner.limits import Variant
+from aerial_model.robot.robot import Robot
+from aerial_model.values.request import LOWER_MARGIN, UPPER_MARGIN, MotionRequest
+from aerial_planner.formulation.limits import Variant
+from aerial_planner.motion.schedule import load_motion
 from aerial_planner.planner import Planner
-from aerial_planner.schedule import load_motion
 
 SHARE = 0.8  # of the reach along each axis within which goals are drawn
 _HALVINGS = 5  # of the search for a reach

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from aerial_evaluation.bench.samples import Row, measure, percentiles, summary
 from aerial_evaluation.bench.subject import Subject, usual_request, usual_schedule
-from aerial_planner.inverse_kinematics import InverseKinematics
-from aerial_planner.limits import Variant
-from aerial_planner.reference import body_reference
-from aerial_planner.solver import SolverOptions
-from aerial_planner.srbm import SingleRigidBody
-from aerial_planner.symbolic import base_frame_model
-from aerial_planner.thesis_literal import LiteralProblem, LiteralSolution
+from aerial_planner.formulation.limits import Variant
+from aerial_planner.formulation.srbm import SingleRigidBody
+from aerial_planner.formulation.thesis_literal import LiteralProblem, LiteralSolution
+from aerial_planner.kinematics.base_frame import base_frame_model
+from aerial_planner.kinematics.inverse_kinematics import InverseKinematics
+from aerial_planner.ocp.options import SolverOptions
+from aerial_planner.reference.body import body_reference
 
 REPEATS = 3  # at most: it is slow
 

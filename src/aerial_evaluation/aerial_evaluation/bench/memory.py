@@ -10,9 +10,9 @@ import numpy as np
 
 from aerial_evaluation.bench.samples import Row, measure
 from aerial_evaluation.bench.subject import Subject, usual_request
-from aerial_model.request import MotionRequest
+from aerial_model.values.request import MotionRequest
+from aerial_planner.motion.schedule import load_motion
 from aerial_planner.planner import Planner
-from aerial_planner.schedule import load_motion
 
 REQUESTS = 500
 ROWS = 10

@@ -13,9 +13,9 @@ from aerial_evaluation import figures
 from aerial_evaluation.bench.samples import Row, Sample, measure
 from aerial_evaluation.bench.subject import Subject, usual_request
 from aerial_evaluation.bench.violations import violations
-from aerial_model.plan import Plan
-from aerial_model.robot import Robot
-from aerial_planner.limits import Variant
+from aerial_model.robot.robot import Robot
+from aerial_model.values.plan import Plan
+from aerial_planner.formulation.limits import Variant
 from aerial_planner.planner import PlanningResult
 
 COLOURS = {Variant.KD: "#c44e33", Variant.AAKD_STAR: "#1f6f8b"}  # apart in grey and for the colour-blind too

@@ -9,7 +9,7 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from aerial_wbic.qp_solvers import INFINITY, QpFactory, QuadraticProgram
+from aerial_wbic.force_qp.solvers import INFINITY, QpFactory, QuadraticProgram
 
 _ACCURACY = 1e-6  # of ProxQP's residuals; an active-set method has none
 _BOUNDED = 0.1 * INFINITY  # a bound beyond it is none

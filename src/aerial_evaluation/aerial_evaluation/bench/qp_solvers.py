@@ -11,11 +11,11 @@ from aerial_evaluation.bench import qp_peers
 from aerial_evaluation.bench.samples import Row
 from aerial_evaluation.bench.subject import Subject
 from aerial_evaluation.bench.ticks import record, spread
-from aerial_model.robot import Robot
+from aerial_model.robot.robot import Robot
 from aerial_wbic.controller import Controller
+from aerial_wbic.force_qp.optimization import ForceOptimization, Solution
+from aerial_wbic.force_qp.solvers import SOLVERS
 from aerial_wbic.gains import ControllerGains, QpSolver
-from aerial_wbic.qp import ForceOptimization, Solution
-from aerial_wbic.qp_solvers import SOLVERS
 
 
 class ProblemController(Controller):

@@ -9,7 +9,7 @@ import numpy as np
 from aerial_evaluation.bench import reach_figure
 from aerial_evaluation.bench.samples import Row, measure
 from aerial_evaluation.bench.subject import Subject
-from aerial_model.request import MotionRequest
+from aerial_model.values.request import MotionRequest
 from aerial_planner.planner import Planner
 
 DIRECTIONS = 16  # of the map

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from aerial_model.errors import RefusalError
-from aerial_model.request import MotionRequest
-from aerial_planner.checks import ACTUATOR_TOLERANCE
+from aerial_model.values.request import MotionRequest
+from aerial_planner.assembly.checks import ACTUATOR_TOLERANCE
 from aerial_planner.planner import Planner, PlanningResult, PlanReport
 
 Row = dict[str, Any]  # one line of a table; plain JSON types

@@ -9,8 +9,8 @@ import numpy as np
 from aerial_evaluation.bench.samples import Row, measure, summary
 from aerial_evaluation.bench.subject import Subject, usual_request, usual_schedule
 from aerial_model.errors import AerialError
-from aerial_model.robot import Robot
-from aerial_model.robot_file import known_robots
+from aerial_model.robot.loading import known_robots
+from aerial_model.robot.robot import Robot
 from aerial_planner.planner import Planner
 
 KNOTS = (20, 40, 80, 160)  # of the take-off

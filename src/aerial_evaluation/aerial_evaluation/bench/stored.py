@@ -11,8 +11,8 @@ import numpy as np
 from aerial_evaluation.bench.goals import SHARE, Family, draw, families, find_reach
 from aerial_evaluation.bench.samples import Row, Sample, measure, summary
 from aerial_evaluation.bench.subject import Subject
-from aerial_model.plan import Plan
-from aerial_planner.plan_library import PlanLibrary
+from aerial_model.values.plan import Plan
+from aerial_planner.assembly.library import PlanLibrary
 
 STARTS = ("reference", "srbm", "library")
 

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from aerial_model.errors import ConfigurationError
-from aerial_model.request import MotionRequest
-from aerial_model.robot import Robot
-from aerial_planner.limits import Variant
+from aerial_model.robot.robot import Robot
+from aerial_model.values.request import MotionRequest
+from aerial_planner.formulation.limits import Variant
+from aerial_planner.motion.schedule import Schedule, contact_schedule, known_motions, load_motion
 from aerial_planner.planner import Planner
-from aerial_planner.schedule import Schedule, contact_schedule, known_motions, load_motion
 from aerial_planner.settings import PlannerSettings
 
 FORWARD = (

@@ -15,10 +15,11 @@ import numpy as np
 from aerial_evaluation.bench.samples import Row
 from aerial_evaluation.bench.subject import Subject, usual_request
 from aerial_evaluation.closed_loop import STAND_TIME, Loop
-from aerial_evaluation.landing import OBSERVE_TIME
-from aerial_model.plan import Plan
-from aerial_model.robot import Robot
-from aerial_model.state import Command, Measurement
+from aerial_evaluation.judgement.landing import OBSERVE_TIME
+from aerial_model.robot.robot import Robot
+from aerial_model.values.command import Command
+from aerial_model.values.measurement import Measurement
+from aerial_model.values.plan import Plan
 from aerial_sim.simulation import Simulation
 from aerial_wbic.controller import Controller
 from aerial_wbic.gains import ControllerGains, QpSolver, TaskOrder

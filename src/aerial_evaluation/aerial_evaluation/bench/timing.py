@@ -9,7 +9,7 @@ import numpy as np
 from aerial_evaluation.bench.goals import Family, draw, families, find_reach
 from aerial_evaluation.bench.samples import Row, Sample, measure, percentiles, summary
 from aerial_evaluation.bench.subject import Subject
-from aerial_model.request import MotionRequest
+from aerial_model.values.request import MotionRequest
 
 
 def timing(subject: Subject) -> list[Row]:

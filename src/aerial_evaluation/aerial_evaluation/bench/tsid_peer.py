@@ -17,7 +17,7 @@ from aerial_evaluation.bench.samples import Row
 from aerial_evaluation.bench.subject import Subject
 from aerial_evaluation.bench.ticks import Recording, TimedController, record, spread
 from aerial_model.kinematics import Configuration
-from aerial_model.robot import Robot
+from aerial_model.robot.robot import Robot
 from aerial_wbic.controller import Controller
 from aerial_wbic.gains import ControllerGains, QpSolver
 from aerial_wbic.target import WholeBodyTarget

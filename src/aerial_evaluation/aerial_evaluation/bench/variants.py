@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from aerial_evaluation.bench.samples import Row, Sample, measure, summary
 from aerial_evaluation.bench.subject import Subject, usual_request
-from aerial_planner.limits import Variant
+from aerial_planner.formulation.limits import Variant
 
 
 def variants(subject: Subject) -> list[Row]:

@@ -12,13 +12,13 @@ from aerial_evaluation.bench.planner import measured
 from aerial_evaluation.bench.subject import Subject, motions_of
 from aerial_model.config import closest
 from aerial_model.errors import ConfigurationError
-from aerial_model.robot import Robot
-from aerial_operator import loop_bench
-from aerial_operator.bench_tables import tables
+from aerial_model.robot.robot import Robot
+from aerial_operator.bench import loop
+from aerial_operator.bench.tables import tables
 from aerial_operator.console import Report, UsageError, say, to_json
-from aerial_operator.planning import compile_functions
-from aerial_planner.compiled import default_cache
-from aerial_planner.limits import Variant
+from aerial_operator.options.planning import compile_functions
+from aerial_planner.codegen.library import default_cache
+from aerial_planner.formulation.limits import Variant
 
 SECTIONS = {"planner": planner.SECTIONS, "controller": controller.SECTIONS}
 PEERS = {peer.name: peer for peer in (crocoddyl_peer.PEER, tsid_peer.PEER)}  # by the section that compares with it
@@ -108,12 +108,12 @@ def _loop(args: argparse.Namespace) -> Report:
     """Measure the control loop; it succeeds if the robot stayed on its feet to the end."""
     file = args.out / "loop.json"
     _write(file, "{}")  # before a minute is spent on what cannot be written
-    figures = loop_bench.measure(
+    figures = loop.measure(
         args.robot, motions=args.motions or (), seconds=args.seconds, seed=args.seed, folder=args.out
     )
     _write(file, to_json(figures))
     say(f"figures are in {file}")
-    return Report(success=figures["complete"], figures=figures, text=loop_bench.tables(figures))
+    return Report(success=figures["complete"], figures=figures, text=loop.tables(figures))
 
 
 def _sections(args: argparse.Namespace) -> list[str]:

@@ -10,16 +10,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from aerial_evaluation.campaign import FIGURES, Campaign, results, summary, trials, workers
-from aerial_evaluation.campaign_figure import draw
-from aerial_evaluation.consistency import ERRORS, NORMALIZED
-from aerial_evaluation.tracking import FIGURES as TRACKED
-from aerial_model.robot import Robot
+from aerial_evaluation.campaign.campaign import FIGURES, Campaign, results, summary, trials, workers
+from aerial_evaluation.campaign.figure import draw
+from aerial_evaluation.judgement.consistency import ERRORS, NORMALIZED
+from aerial_evaluation.judgement.tracking import FIGURES as TRACKED
+from aerial_model.robot.robot import Robot
 from aerial_operator.console import ProgressBar, Report, UsageError, pairs, say, table, to_json
-from aerial_operator.goal import add_goal_arguments, request_from
-from aerial_operator.planning import add_planner_arguments, planner_choices
-from aerial_operator.settings import add_setting_argument, with_settings
-from aerial_operator.world import add_vary_argument, add_world_argument, conditions_from
+from aerial_operator.options.goal import add_goal_arguments, request_from
+from aerial_operator.options.planning import add_planner_arguments, planner_choices
+from aerial_operator.options.settings import add_setting_argument, with_settings
+from aerial_operator.options.world import add_vary_argument, add_world_argument, conditions_from
 
 FAILURES_SHOWN = 10
 _PASSED_ON = {  # what a trial alone must be told, and what it takes to be so

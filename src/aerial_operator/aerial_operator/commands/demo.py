@@ -10,15 +10,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from aerial_model.request import MotionRequest
-from aerial_model.robot import Robot
+from aerial_model.robot.robot import Robot
+from aerial_model.values.request import MotionRequest
 from aerial_operator.client import connected
 from aerial_operator.console import Report, percent, say, table
 from aerial_operator.live import Attempt, attempt, await_ready, keep_apart
-from aerial_operator.nodes import PLANNER, SIMULATOR, NodeProcesses, parameters
-from aerial_operator.pictures import save_picture
-from aerial_operator.recording import Recorder
-from aerial_operator.trial import Trial, judged
+from aerial_operator.picture import save_picture
+from aerial_operator.processes import PLANNER, SIMULATOR, NodeProcesses, parameters
+from aerial_operator.recording.recorder import Recorder
+from aerial_operator.recording.trial import Trial, judged
 
 MOTION = "jump"
 JUMPS = {

@@ -6,9 +6,9 @@ import argparse
 from pathlib import Path
 
 from aerial_model.errors import ConfigurationError
-from aerial_model.robot_description import resolved
-from aerial_model.robot_draft import draft
-from aerial_model.robot_file import YAML_NAME
+from aerial_model.robot.draft import draft
+from aerial_model.robot.loading import YAML_NAME
+from aerial_model.robot.urdf import resolved
 from aerial_operator.console import Report
 
 

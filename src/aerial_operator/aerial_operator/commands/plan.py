@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from aerial_evaluation.verification import Verification, verify
+from aerial_evaluation.judgement.verification import Verification, verify
 from aerial_model.errors import RefusalError
-from aerial_model.plan_file import save_plan
-from aerial_model.robot import Robot
+from aerial_model.robot.robot import Robot
+from aerial_model.values.plan_file import save_plan
 from aerial_operator.console import Report, pairs, percent, say
-from aerial_operator.goal import add_goal_arguments, request_from
-from aerial_operator.planning import add_planner_arguments, planner_choices, warm_planner
+from aerial_operator.options.goal import add_goal_arguments, request_from
+from aerial_operator.options.planning import add_planner_arguments, planner_choices, warm_planner
 from aerial_planner.planner import PlanReport
 
 _STARTS = {"library": "library", "srbm": "warm", "reference": "cold"}
@@ -26,7 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--verify", action="store_true", help="let MuJoCo fly the plan; it fails 3° or 3 cm off the goal"
     )
-    parser.add_argument("--out", metavar="FILE", type=Path, help="save the plan (.npz, see aerial_model.plan_file)")
+    parser.add_argument(
+        "--out", metavar="FILE", type=Path, help="save the plan (.npz, see aerial_model.values.plan_file)"
+    )
 
 
 def run(args: argparse.Namespace) -> Report:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 
-from aerial_model.request import ControllerCommand
-from aerial_model.robot import Robot
+from aerial_model.robot.robot import Robot
+from aerial_model.values.request import ControllerCommand
 from aerial_operator.client import connected
 from aerial_operator.console import Report, say
-from aerial_operator.goal import add_goal_arguments, request_from
+from aerial_operator.options.goal import add_goal_arguments, request_from
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

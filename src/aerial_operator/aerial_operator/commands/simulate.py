@@ -8,13 +8,13 @@ from pathlib import Path
 from aerial_evaluation.closed_loop import Outcome
 from aerial_evaluation.closed_loop import run as run_closed_loop
 from aerial_model.errors import RefusalError
-from aerial_model.robot import Robot
+from aerial_model.robot.robot import Robot
 from aerial_operator.console import Report, pairs, percent, say
-from aerial_operator.goal import add_goal_arguments, request_from
-from aerial_operator.pictures import save_picture
-from aerial_operator.planning import add_planner_arguments, planner_choices, warm_planner
-from aerial_operator.settings import add_setting_argument, with_settings
-from aerial_operator.world import add_world_argument, conditions_from
+from aerial_operator.options.goal import add_goal_arguments, request_from
+from aerial_operator.options.planning import add_planner_arguments, planner_choices, warm_planner
+from aerial_operator.options.settings import add_setting_argument, with_settings
+from aerial_operator.options.world import add_world_argument, conditions_from
+from aerial_operator.picture import save_picture
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

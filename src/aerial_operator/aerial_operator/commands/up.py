@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from aerial_model.robot import Robot
+from aerial_model.robot.robot import Robot
 from aerial_operator.client import connected
 from aerial_operator.console import Report, say
-from aerial_operator.nodes import PLANNER, NodeProcesses, parameters
+from aerial_operator.processes import PLANNER, NodeProcesses, parameters
 
 _WATCH_PERIOD = 0.5  # between two looks at the processes [s]
 _PATIENCE = 20.0  # after which a person is told what is missing [s]

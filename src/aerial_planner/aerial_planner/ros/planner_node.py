@@ -17,25 +17,25 @@ from rclpy.action.server import ServerGoalHandle
 from sensor_msgs.msg import JointState
 
 from aerial_model.errors import AerialError, RefusalError
-from aerial_model.request import ControllerCommand, MotionRequest
-from aerial_model.robot import Robot
-from aerial_model.ros import node, qos
-from aerial_model.ros.messages import (
+from aerial_model.robot.robot import Robot
+from aerial_model.values.estimate import Estimate
+from aerial_model.values.request import ControllerCommand, MotionRequest
+from aerial_msgs.action import PlanMotion
+from aerial_msgs.msg import MotionPlan, MotionResult, MotionSelection
+from aerial_planner.assembly.library import PlanLibrary
+from aerial_planner.codegen.library import default_cache
+from aerial_planner.motion.schedule import known_motions
+from aerial_planner.ocp.options import SolverName
+from aerial_planner.planner import Planner
+from aerial_planner.ros.worker import Worker
+from aerial_ros import node, qos
+from aerial_ros.messages import (
     code_to_message,
     estimate_from_messages,
     plan_to_message,
     result_to_message,
     selection_from_message,
 )
-from aerial_model.state import Estimate
-from aerial_msgs.action import PlanMotion
-from aerial_msgs.msg import MotionPlan, MotionResult, MotionSelection
-from aerial_planner.compiled import default_cache
-from aerial_planner.plan_library import PlanLibrary
-from aerial_planner.planner import Planner
-from aerial_planner.ros.worker import Worker
-from aerial_planner.schedule import known_motions
-from aerial_planner.solver import SolverName
 
 REPEAT_PERIOD = 0.5  # from one publication of a plan that no controller has answered to the next [s]
 REPEAT_TIME = 8.0  # for which it is repeated: on a busy machine, nodes that have just started find each other late [s]

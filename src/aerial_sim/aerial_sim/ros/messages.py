@@ -9,7 +9,7 @@ from geometry_msgs.msg import Point, Quaternion, Vector3
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
 
-from aerial_model.robot import (
+from aerial_model.robot.robot import (
     BASE_ANGULAR,
     BASE_LINEAR,
     BASE_ORIENTATION,
@@ -18,9 +18,9 @@ from aerial_model.robot import (
     JOINT_VELOCITY,
     Robot,
 )
-from aerial_model.ros.messages import doubles, from_stamp, to_stamp
-from aerial_model.state import Measurement
+from aerial_model.values.measurement import Measurement
 from aerial_msgs.msg import GroundTruth as GroundTruthMessage
+from aerial_ros.messages import doubles, from_stamp, to_stamp
 from aerial_sim.ground_truth import GroundTruth
 
 WORLD_FRAME = "world"

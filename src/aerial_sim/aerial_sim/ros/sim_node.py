@@ -18,20 +18,20 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
 from aerial_model.errors import ConfigurationError, RefusalError
-from aerial_model.request import ControllerCommand
-from aerial_model.robot import Robot
-from aerial_model.ros import qos
-from aerial_model.ros.messages import selection_from_message, to_stamp
-from aerial_model.ros.node import AerialNode
-from aerial_model.ros.node import main as run
-from aerial_model.ros.wire import CommandWire, StateWire
+from aerial_model.robot.robot import Robot
+from aerial_model.values.request import ControllerCommand
 from aerial_msgs.msg import GroundTruth, JointCommand, MotionResult, MotionSelection, RobotState
 from aerial_msgs.srv import Disturb, Reset, Step
-from aerial_sim.latency import Latency
-from aerial_sim.placement import placed_ahead
+from aerial_ros import qos
+from aerial_ros.messages import selection_from_message, to_stamp
+from aerial_ros.node import AerialNode
+from aerial_ros.node import main as run
+from aerial_ros.wire import CommandWire, StateWire
+from aerial_sim.robot_side.round_trip import Latency
+from aerial_sim.robot_side.session import Session
 from aerial_sim.ros.messages import ground_truth_to_message, imu_to_message, joint_state_to_message
-from aerial_sim.session import Session
 from aerial_sim.simulation import Simulation
+from aerial_sim.world.placement import placed_ahead
 
 TELEMETRY_PERIODS = 5  # control periods between two messages for people and tools
 LATE = 0.25  # of a period, by which a tick may begin behind its time and the next still keep to theirs

@@ -8,10 +8,10 @@ import numpy as np
 from geometry_msgs.msg import Point, Quaternion, Vector3
 from nav_msgs.msg import Odometry
 
-from aerial_model.robot import BASE_ANGULAR, BASE_LINEAR, BASE_ORIENTATION, BASE_POSITION
-from aerial_model.ros.messages import to_stamp
-from aerial_model.state import Estimate
+from aerial_model.robot.robot import BASE_ANGULAR, BASE_LINEAR, BASE_ORIENTATION, BASE_POSITION
+from aerial_model.values.estimate import Estimate
 from aerial_msgs.msg import ControllerStatus as ControllerStatusMessage
+from aerial_ros.messages import to_stamp
 from aerial_wbic.controller import ControllerStatus
 
 ODOMETRY_FRAME = "odom"

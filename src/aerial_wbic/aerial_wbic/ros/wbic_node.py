@@ -16,13 +16,14 @@ from nav_msgs.msg import Odometry
 from std_srvs.srv import Trigger
 
 from aerial_model.errors import InvalidPlanError, RefusalCode, RefusalError
-from aerial_model.request import ControllerCommand
-from aerial_model.robot import Robot
-from aerial_model.ros import node, qos
-from aerial_model.ros.messages import plan_from_message, result_to_message, to_stamp
-from aerial_model.ros.wire import CommandWire, StateWire
-from aerial_model.state import Command, Measurement
+from aerial_model.robot.robot import Robot
+from aerial_model.values.command import Command
+from aerial_model.values.measurement import Measurement
+from aerial_model.values.request import ControllerCommand
 from aerial_msgs.msg import ControllerStatus, JointCommand, MotionPlan, MotionResult, MotionSelection, RobotState
+from aerial_ros import node, qos
+from aerial_ros.messages import plan_from_message, result_to_message, to_stamp
+from aerial_ros.wire import CommandWire, StateWire
 from aerial_wbic.controller import Controller
 from aerial_wbic.requests import Answer, Outcome, Requests
 from aerial_wbic.ros.messages import Pace, odometry_to_message, status_to_message

@@ -1,0 +1,1 @@
+"""Many seeded trials of one motion."""

@@ -1,0 +1,1 @@
+"""What came of a motion: landed or not, how close to its plan, how good the estimate was."""

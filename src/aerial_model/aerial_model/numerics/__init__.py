@@ -1,0 +1,1 @@
+"""Numerics that all packages share: rotations, compiled linear algebra, memory layouts."""

@@ -1,0 +1,133 @@
+"""The ground: a flat floor plus boxes (platforms, hurdles, steps, the banks of a gap), all in one frame.
+
+The floor lies at the terrain's base, or at the lowest box bottom where that is below: a start on top of a platform is a
+box whose upper face is at 0, so that the floor around it is a step down; a gap is what two such boxes leave between them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from aerial_model.config import frozen_array
+from aerial_model.numerics import rotation
+
+PLATFORM_LENGTH = 0.9  # [m] along the jump: a stance and room to land off the goal
+PLATFORM_WIDTH = 0.9  # [m]
+HURDLE_THICKNESS = 0.03  # [m]
+HURDLE_WIDTH = 0.9  # [m]
+BANK_LENGTH = 1.5  # of the ground on either side of a gap, along the jump [m]
+BANK_WIDTH = 0.9  # [m]
+GAP_DEPTH = 0.3  # [m] about the height a robot here stands at: who falls in has not landed
+
+
+@dataclass(frozen=True, kw_only=True)
+class Box:
+    """A box standing on (or sunk into) the ground, turned by ``yaw`` about z."""
+
+    centre: np.ndarray  # (3,) [m]
+    size: np.ndarray  # (3,) full side lengths [m]
+    yaw: float = 0.0  # [rad]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centre", frozen_array(self.centre, "box centre", (3,)))
+        object.__setattr__(self, "size", frozen_array(self.size, "box size", (3,)))
+        if np.any(self.size <= 0) or not np.isfinite(self.yaw):
+            raise ValueError(
+                f"a box needs positive side lengths and a finite yaw, found size {self.size}, yaw {self.yaw}"
+            )
+
+    @property
+    def top(self) -> float:
+        """Height of the upper face [m]."""
+        return float(self.centre[2] + self.size[2] / 2)
+
+    def covers(self, points: np.ndarray, margin: float = 0.0) -> np.ndarray:
+        """Return for points ``(..., 2+)`` [m] whether they lie over the box, grown by ``margin`` [m] to all sides."""
+        c, s = np.cos(self.yaw), np.sin(self.yaw)
+        offset = np.asarray(points)[..., :2] - self.centre[:2]
+        local = np.stack([c * offset[..., 0] + s * offset[..., 1], -s * offset[..., 0] + c * offset[..., 1]], axis=-1)
+        return np.all(np.abs(local) <= self.size[:2] / 2 + margin, axis=-1)
+
+    def placed(self, origin: np.ndarray, yaw: float) -> Box:
+        """Return this box when the frame it is expressed in stands at ``origin`` ``(3,)`` [m], turned by ``yaw`` [rad]."""
+        centre = np.asarray(origin) + rotation.matrix(rotation.about_z(yaw)) @ self.centre
+        return Box(centre=centre, size=self.size, yaw=self.yaw + yaw)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Terrain:
+    """A flat floor and boxes on it, in the start heading frame unless said otherwise."""
+
+    boxes: tuple[Box, ...] = field(default_factory=tuple)
+    base: float = 0.0  # height of the floor, unless a box reaches deeper [m]
+
+    @staticmethod
+    def platform(height: float, edge: float, direction: float) -> Terrain:
+        """Return a platform to jump onto, or, with a negative ``height`` [m], one to jump off.
+
+        Args:
+            height: of the landing above the start [m], not 0.
+            edge: distance from the origin, along the jump, to the near edge of the platform jumped onto or to the far
+                edge of the one jumped off [m].
+            direction: of the jump, angle from x [rad].
+        """
+        middle = edge + PLATFORM_LENGTH / 2 if height > 0 else edge - PLATFORM_LENGTH / 2
+        centre = np.array([middle * np.cos(direction), middle * np.sin(direction), height / 2])
+        return Terrain(
+            boxes=(Box(centre=centre, size=np.array([PLATFORM_LENGTH, PLATFORM_WIDTH, abs(height)]), yaw=direction),)
+        )
+
+    @staticmethod
+    def hurdle(height: float, edge: float, direction: float) -> Terrain:
+        """Return a thin bar on the ground, across the jump.
+
+        Args:
+            height: of the bar [m].
+            edge: distance from the origin, along the jump, to the bar's near face [m].
+            direction: of the jump, angle from x [rad].
+        """
+        middle = edge + HURDLE_THICKNESS / 2
+        centre = np.array([middle * np.cos(direction), middle * np.sin(direction), height / 2])
+        return Terrain(
+            boxes=(Box(centre=centre, size=np.array([HURDLE_THICKNESS, HURDLE_WIDTH, height]), yaw=direction),)
+        )
+
+    @staticmethod
+    def gap(width: float, edge: float, direction: float, height: float = 0.0) -> Terrain:
+        """Return a trench across the jump, between the ground jumped from and that jumped onto.
+
+        Args:
+            width: of the trench, along the jump [m].
+            edge: distance from the origin, along the jump, to the trench [m].
+            direction: of the jump, angle from x [rad].
+            height: of the far bank above the near one [m].
+        """
+        near = _bank(edge - BANK_LENGTH / 2, 0.0, direction)
+        return Terrain(boxes=(near, _bank(edge + width + BANK_LENGTH / 2, height, direction)))
+
+    @property
+    def floor(self) -> float:
+        """Height of the flat floor [m]."""
+        return min([self.base, *(float(box.centre[2] - box.size[2] / 2) for box in self.boxes)])
+
+    def height(self, points: np.ndarray, margin: float = 0.0) -> np.ndarray:
+        """Return the height [m] of the ground under points ``(..., 2+)`` [m], boxes grown by ``margin`` [m]."""
+        points = np.asarray(points)
+        ground = np.full(points.shape[:-1], self.floor)
+        for box in self.boxes:
+            ground = np.where(box.covers(points, margin), np.maximum(ground, box.top), ground)
+        return ground
+
+    def placed(self, origin: np.ndarray, yaw: float) -> Terrain:
+        """Return the terrain expressed in a frame where its own stands at ``origin`` ``(3,)``, turned by ``yaw``."""
+        boxes = tuple(box.placed(origin, yaw) for box in self.boxes)
+        return Terrain(boxes=boxes, base=float(origin[2]) + self.base)
+
+
+def _bank(middle: float, top: float, direction: float) -> Box:
+    """Return a box from the bottom of a gap up to ``top``, its middle at a distance along the jump; all in [m]."""
+    size = np.array([BANK_LENGTH, BANK_WIDTH, top + GAP_DEPTH])
+    centre = np.array([middle * np.cos(direction), middle * np.sin(direction), (top - GAP_DEPTH) / 2])
+    return Box(centre=centre, size=size, yaw=direction)

@@ -1,0 +1,1 @@
+"""Benchmarks of running nodes, and the tables of all benchmarks."""

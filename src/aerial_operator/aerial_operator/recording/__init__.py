@@ -1,0 +1,1 @@
+"""Recordings of running nodes, and the verdict on a recorded motion."""

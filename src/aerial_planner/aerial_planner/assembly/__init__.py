@@ -1,0 +1,1 @@
+"""From an optimum to a checked plan."""

@@ -1,0 +1,1 @@
+"""CasADi functions as machine code that evaluates many points at once."""

@@ -1,0 +1,1 @@
+"""The robot as CasADi expressions, and inverse kinematics by them."""

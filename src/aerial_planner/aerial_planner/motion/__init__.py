@@ -1,0 +1,1 @@
+"""Motions as data, and the contact schedule of a request."""

@@ -1,0 +1,1 @@
+"""A solver for multi-stage optimal control problems, which knows no robot."""

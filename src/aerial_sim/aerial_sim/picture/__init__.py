@@ -1,0 +1,1 @@
+"""Pictures of a robot and its terrain, by ray casting."""

@@ -1,0 +1,1 @@
+"""The MuJoCo model of robot and terrain, and what touches what in it."""

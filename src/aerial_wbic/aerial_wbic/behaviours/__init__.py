@@ -1,0 +1,1 @@
+"""What the robot does at a time: stand, follow a plan, come to rest, fold, lie."""

@@ -1,0 +1,1 @@
+"""Where the robot is, and which of its contact points bear load."""

@@ -1,0 +1,1 @@
+"""The force optimization, thesis (3.24)."""
