@@ -10,6 +10,7 @@ import pytest
 from aerial_evaluation.judgement.landing import OBSERVE_TIME, Tick, judge
 from aerial_model.numerics import rotation
 from aerial_model.robot.robot import BASE_ORIENTATION, Robot
+from aerial_model.values.frame import StartFrame
 from aerial_model.values.plan import Plan
 from aerial_sim.ground_truth import GroundTruth
 
@@ -63,7 +64,7 @@ def plan(robot):
 @pytest.fixture
 def ticks(robot, plan):
     """A history that does exactly what the plan says, then stands."""
-    placed = plan.placed(ORIGIN, HEADING)
+    placed = plan.placed(StartFrame(origin=ORIGIN, heading=HEADING))
     n_c, n = robot.n_contacts, robot.n_joints
     history = []
     for t in np.arange(round((LANDING + OBSERVE_TIME) / DT) + 1) * DT:
@@ -93,7 +94,7 @@ def ticks(robot, plan):
 @pytest.fixture
 def verdict(robot, plan):
     def verdict(ticks, plan=plan):
-        return judge(robot, plan, origin=ORIGIN, heading=HEADING, start_time=START, ticks=ticks)
+        return judge(robot, plan, frame=StartFrame(origin=ORIGIN, heading=HEADING), start_time=START, ticks=ticks)
 
     return verdict
 
@@ -254,5 +255,5 @@ def test_a_history_that_ends_early_is_no_verdict(verdict, ticks):
 
 def test_the_start_heading_frame_is_the_robots_not_the_worlds(robot, plan, ticks):
     """The same history judged from another heading is off in place."""
-    result = judge(robot, plan, origin=ORIGIN, heading=HEADING + 1.0, start_time=START, ticks=ticks)
+    result = judge(robot, plan, frame=StartFrame(origin=ORIGIN, heading=HEADING + 1.0), start_time=START, ticks=ticks)
     assert result.failed == ("position",)

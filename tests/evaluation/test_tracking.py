@@ -10,6 +10,7 @@ from aerial_evaluation.judgement.landing import Tick
 from aerial_evaluation.judgement.tracking import FIGURES, PHASES, SAMPLES, sampled, summary
 from aerial_model.numerics import rotation
 from aerial_model.robot.robot import BASE_ANGULAR, BASE_ORIENTATION, BASE_POSITION, Robot
+from aerial_model.values.frame import StartFrame
 from aerial_model.values.request import MotionRequest
 from aerial_planner.planner import Planner
 from aerial_sim.ground_truth import GroundTruth
@@ -31,7 +32,7 @@ def plan(robot):
 
 def followed(robot, plan, change=lambda q, v: (q, v)):
     """The figures of a run that follows a plan but for a change of its state."""
-    placed, n, n_c = plan.placed(ORIGIN, HEADING), robot.n_joints, robot.n_contacts
+    placed, n, n_c = plan.placed(StartFrame(origin=ORIGIN, heading=HEADING)), robot.n_joints, robot.n_contacts
     ticks = []
     for time in np.arange(-0.1, plan.landing_time + 1.0, PERIOD):
         wanted = placed.sample(time)
@@ -39,7 +40,7 @@ def followed(robot, plan, change=lambda q, v: (q, v)):
         nothing = (np.zeros(n_c, dtype=bool), np.zeros((n_c, 3)), (), False, np.zeros(n), np.zeros(n), 0.0, 0.0)
         names = [f.name for f in dataclasses.fields(GroundTruth)]
         ticks.append(Tick(truth=GroundTruth(**dict(zip(names, (START + time, q, v, *nothing), strict=True)))))
-    return sampled(robot, plan, origin=ORIGIN, heading=HEADING, start_time=START, ticks=ticks)
+    return sampled(robot, plan, frame=StartFrame(origin=ORIGIN, heading=HEADING), start_time=START, ticks=ticks)
 
 
 def test_who_does_as_planned_is_off_by_nothing_until_touchdown(robot, plan):
@@ -82,7 +83,7 @@ def test_after_landing_all_turning_is_too_much(robot, plan):
 
 def test_a_run_that_ends_before_a_phase_has_no_figures_of_it(robot, plan):
     ticks = []
-    assert sampled(robot, plan, origin=ORIGIN, heading=HEADING, start_time=START, ticks=ticks) == {}
+    assert sampled(robot, plan, frame=StartFrame(origin=ORIGIN, heading=HEADING), start_time=START, ticks=ticks) == {}
 
 
 def test_many_runs_are_pooled():

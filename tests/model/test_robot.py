@@ -9,6 +9,7 @@ import yaml
 from aerial_model.errors import ConfigurationError
 from aerial_model.robot.loading import known_robots
 from aerial_model.robot.robot import Robot
+from aerial_model.values.frame import StartFrame
 
 MINI_CHEETAH = known_robots()["mini_cheetah"]
 
@@ -46,7 +47,8 @@ def test_left_and_right_mirror_each_other():
 
 def test_the_start_frame_stands_on_the_ground_under_the_support_and_looks_ahead():
     robot = Robot.load("mini_cheetah")
-    origin, yaw = robot.start_frame(robot.standing_configuration())
+    frame = StartFrame.of(robot, robot.standing_configuration())
+    origin, yaw = frame.origin, frame.heading
     np.testing.assert_allclose(origin, 0.0, atol=1e-9)
     assert yaw == 0.0
 

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from aerial_model.values.frame import StartFrame
 from aerial_model.values.terrain import GAP_DEPTH, Box, Terrain
 
 
@@ -28,7 +29,9 @@ def test_a_gap_is_deep_between_its_banks(height):
 
 def test_the_floor_of_a_placed_terrain_keeps_its_distance():
     for terrain in (Terrain(), Terrain.platform(0.2, 0.3, 0.0), Terrain.gap(0.3, 0.25, 0.0)):
-        assert terrain.placed(np.array([0.0, 0.0, 0.5]), 0.3).floor == pytest.approx(0.5 + terrain.floor)
+        assert terrain.placed(StartFrame(origin=np.array([0.0, 0.0, 0.5]), heading=0.3)).floor == pytest.approx(
+            0.5 + terrain.floor
+        )
 
 
 def test_a_placed_terrain_has_the_same_heights_at_the_moved_points():
@@ -38,8 +41,10 @@ def test_a_placed_terrain_has_the_same_heights_at_the_moved_points():
     c, s = np.cos(yaw), np.sin(yaw)
     moved = points @ np.array([[c, s], [-s, c]]) + origin[:2]
     over_box = terrain.boxes[0].covers(points)
-    np.testing.assert_array_equal(terrain.placed(origin, yaw).boxes[0].covers(moved), over_box)
-    assert terrain.placed(origin, yaw).boxes[0].top == pytest.approx(0.66)
+    np.testing.assert_array_equal(
+        terrain.placed(StartFrame(origin=origin, heading=yaw)).boxes[0].covers(moved), over_box
+    )
+    assert terrain.placed(StartFrame(origin=origin, heading=yaw)).boxes[0].top == pytest.approx(0.66)
 
 
 @pytest.mark.parametrize("size", [[0.0, 1.0, 1.0], [1.0, -1.0, 1.0]])

@@ -12,6 +12,7 @@ from aerial_model.numerics import rotation
 from aerial_model.robot.contact import friction_pyramid
 from aerial_model.robot.robot import BASE_ORIENTATION, Robot
 from aerial_model.values.estimate import Estimate
+from aerial_model.values.frame import StartFrame
 from aerial_model.values.request import MotionRequest
 from aerial_model.values.terrain import Terrain
 from aerial_planner.ocp.options import SolverName
@@ -197,8 +198,8 @@ def test_a_sampled_plan_is_continuous(forward):
 
 def test_a_placed_plan_is_the_same_motion_elsewhere(forward, robot):
     plan = forward.plan
-    moved = plan.placed(np.array([1.0, 2.0, 0.3]), 0.7).checked(robot)
-    back = moved.placed(np.zeros(3), -0.7)
+    moved = plan.placed(StartFrame(origin=np.array([1.0, 2.0, 0.3]), heading=0.7)).checked(robot)
+    back = moved.placed(StartFrame(heading=-0.7))
     shift = rotation.matrix(rotation.about_z(-0.7)) @ np.array([1.0, 2.0, 0.3])
     np.testing.assert_allclose(back.com - shift, plan.com, atol=1e-12)
     np.testing.assert_allclose(
@@ -220,7 +221,7 @@ def test_a_plan_starts_where_the_robot_stands(planner, robot):
     q[3:7] = rotation.multiply(rotation.about_z(2.0), q[3:7])
     plan = planner.plan(jump(0.3, 0.0), Estimate(time=0.0, q=q, v=np.zeros(18))).plan
     np.testing.assert_allclose(plan.q[0, 7:], q[7:], atol=1e-6)
-    feet = plan.placed(*robot.start_frame(q)).foot_position[0]
+    feet = plan.placed(StartFrame.of(robot, q)).foot_position[0]
     np.testing.assert_allclose(feet, robot.contact_positions(q), atol=1e-6)
 
 

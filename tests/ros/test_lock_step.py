@@ -7,6 +7,7 @@ from std_srvs.srv import SetBool
 
 from aerial_evaluation.judgement.landing import OBSERVE_TIME, Tick, judge
 from aerial_model.robot.robot import Robot
+from aerial_model.values.frame import StartFrame
 from aerial_model.values.request import MotionRequest
 from aerial_msgs.msg import GroundTruth, JointCommand, MotionPlan, MotionResult, MotionSelection, RobotState
 from aerial_msgs.srv import Step
@@ -100,12 +101,11 @@ def test_a_jump_lands_and_repeats_to_the_last_bit(jump):
     plan = plan_from_message(first.plans[0], robot)
     truths = [ground_truth_from_message(message) for message in first.truths]
     start = STAND_PERIODS - 1
-    origin, heading = robot.start_frame(truths[start].q)
+    frame = StartFrame.of(robot, truths[start].q)
     landing = judge(
         robot,
         plan,
-        origin=origin,
-        heading=heading,
+        frame=frame,
         start_time=truths[start].time,
         ticks=[Tick(truth=truth) for truth in truths],
     )

@@ -4,6 +4,7 @@ from PIL import Image
 
 from aerial_model.numerics import rotation
 from aerial_model.robot.robot import BASE_ORIENTATION, BASE_POSITION
+from aerial_model.values.frame import StartFrame
 from aerial_model.values.terrain import Box, Terrain
 from aerial_sim.picture.picture import Footage, frames, save, save_animation, strobe
 from aerial_sim.picture.raycast import SUN_DIRECTION, Camera, render
@@ -27,7 +28,7 @@ def footage(robot, origin, heading):
     turn = rotation.about_z(heading)
     q[:, BASE_POSITION] = q[:, BASE_POSITION] @ rotation.matrix(turn).T + origin
     q[:, BASE_ORIENTATION] = rotation.multiply(turn, q[:, BASE_ORIENTATION])
-    terrain = PLATFORM.placed(origin, heading)
+    terrain = PLATFORM.placed(StartFrame(origin=origin, heading=heading))
     return Footage.of(robot, terrain, time + 7, q, start_time=7.0, take_off_time=TAKE_OFF, landing_time=LANDING)
 
 

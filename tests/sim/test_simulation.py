@@ -7,6 +7,7 @@ from aerial_model.errors import ConfigurationError
 from aerial_model.kinematics import Kinematics
 from aerial_model.numerics import rotation
 from aerial_model.robot.robot import BASE_ORIENTATION, JOINT_POSITION
+from aerial_model.values.frame import StartFrame
 from aerial_model.values.measurement import Measurement
 from aerial_model.values.terrain import Box, Terrain
 from aerial_sim.conditions import Conditions
@@ -179,7 +180,7 @@ def test_localization_counts_from_where_the_robot_started(robot, hold):
     equipped = robot.with_section("sensors", localization_rate=500, localization_noise=0.0)
     simulation = Simulation(equipped, terrain=PLATFORM, seed=1)
     q, _ = simulation.state()
-    origin, _ = robot.start_frame(q)
+    origin = StartFrame.of(robot, q).origin
     np.testing.assert_allclose(simulation.measure().localization, q[:3] - origin, atol=1e-12)
 
 
@@ -234,7 +235,7 @@ def test_a_push_moves_the_trunk_as_long_as_it_lasts(robot, torque_command):
 def test_added_mass_weighs_and_survives_new_terrain(robot, hold):
     simulation = Simulation(robot, noise="off")
     simulation.disturb(added_mass=1.0)
-    simulation.set_terrain(PLATFORM.placed(np.array([2.0, 0.0, 0.0]), 0.0))
+    simulation.set_terrain(PLATFORM.placed(StartFrame(origin=np.array([2.0, 0.0, 0.0]))))
     truth = advance(simulation, hold, STAND_TIME)
     assert truth.force[:, 2].sum() == pytest.approx((robot.mass + 1.0) * GRAVITY, abs=0.01)
 

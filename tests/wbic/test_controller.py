@@ -11,6 +11,7 @@ from aerial_evaluation.judgement.landing import OBSERVE_TIME, Tick, judge
 from aerial_model.errors import InvalidPlanError, RefusalCode, RefusalError
 from aerial_model.numerics import rotation
 from aerial_model.robot.robot import BASE_ORIENTATION, BASE_POSITION, BASE_TWIST, Robot
+from aerial_model.values.frame import StartFrame
 from aerial_sim.simulation import Simulation
 from aerial_wbic.behaviours.phase import Phase
 from aerial_wbic.controller import Controller
@@ -71,11 +72,11 @@ def test_it_hops_lands_and_stands_ready_for_the_next(robot, hop, seed):
     loop = Loop(robot, seed=seed)
     loop.run(STAND_TIME)
     for _ in range(2):
-        origin, heading = robot.start_frame(loop.truth.q)
+        frame = StartFrame.of(robot, loop.truth.q)
         start = loop.measurement.time
         loop.controller.accept(hop)
         loop.run(hop.landing_time + OBSERVE_TIME)
-        verdict = judge(robot, hop, origin=origin, heading=heading, start_time=start, ticks=loop.ticks)
+        verdict = judge(robot, hop, frame=frame, start_time=start, ticks=loop.ticks)
         assert verdict.failed == ()
         assert loop.controller.phase is Phase.STAND
     assert list(dict.fromkeys(loop.phases)) == [Phase.STAND, Phase.TAKE_OFF, Phase.FLIGHT, Phase.LANDING]

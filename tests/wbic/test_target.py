@@ -7,6 +7,7 @@ import pytest
 
 from aerial_model.numerics import rotation
 from aerial_model.robot.robot import BASE_ANGULAR
+from aerial_model.values.frame import StartFrame
 from aerial_wbic.behaviours.support import support_centre, supported
 from aerial_wbic.target import Fold, Following, Hold
 
@@ -81,7 +82,7 @@ def test_a_fold_goes_from_the_joints_as_they_are_to_the_pose(robot, state_at):
 
 
 def test_a_plan_gives_its_sample_in_world_axes(hop, gains):
-    turned = hop.placed(np.array([1.0, 2.0, 0.0]), 0.5)
+    turned = hop.placed(StartFrame(origin=np.array([1.0, 2.0, 0.0]), heading=0.5))
     sample = turned.sample(0.3)
     target = Following(turned.track, gains.follow).at(0.3)
     R = rotation.matrix(sample.q[3:7])

@@ -14,6 +14,7 @@ import numpy as np
 from aerial_evaluation.judgement import consistency, tracking
 from aerial_evaluation.judgement.landing import OBSERVE_TIME, Landing, Tick, judge
 from aerial_model.robot.robot import Robot
+from aerial_model.values.frame import StartFrame
 from aerial_model.values.plan import Plan
 from aerial_model.values.request import MotionRequest
 from aerial_model.values.terrain import Terrain
@@ -82,7 +83,7 @@ class Loop:
         self.wall_time = 0.0  # spent in ``advance`` [s]
         self.cpu_time = 0.0  # of this process meanwhile [s]
         self._q, self._v = simulation.state()  # the truth that the next command answers
-        self._origin, _ = simulation.robot.start_frame(self._q)  # of the estimator's frame, in W
+        self._origin = StartFrame.of(simulation.robot, self._q).origin  # of the estimator's frame, in W
 
     def advance(self, duration: float) -> None:
         """Run for ``duration`` [s] of simulated time."""
@@ -144,11 +145,11 @@ def run(
 
     simulation.set_terrain(terrain_in_world(robot, request.terrain, simulation.state()[0]))
     planning = planner.plan(request, loop.controller.estimate, progress)
-    origin, heading = robot.start_frame(simulation.state()[0])
+    frame = StartFrame.of(robot, simulation.state()[0])
     start_time = simulation.time
     loop.controller.accept(planning.plan)
     _execute(loop, planning.plan, conditions, seed)
-    course = {"origin": origin, "heading": heading, "start_time": start_time, "ticks": loop.ticks}
+    course = {"frame": frame, "start_time": start_time, "ticks": loop.ticks}
     return Outcome(
         landing=judge(robot, planning.plan, **course, ground_rise=conditions.ground_rise),
         planning=planning,
@@ -177,5 +178,4 @@ def _execute(loop: Loop, plan: Plan, conditions: Conditions, seed: int) -> None:
 
 def terrain_in_world(robot: Robot, terrain: Terrain, q: np.ndarray) -> Terrain:
     """Return a request's terrain in W, for a robot that stands at ``q`` ``(nq,)`` in W; the floor comes to lie at 0."""
-    origin, heading = robot.start_frame(q)
-    return terrain.placed(np.array([origin[0], origin[1], -terrain.floor]), heading)
+    return terrain.placed(StartFrame.of(robot, q).on_floor(-terrain.floor))

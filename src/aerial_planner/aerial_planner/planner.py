@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from aerial_model.errors import ConfigurationError, RefusalCode, RefusalError
-from aerial_model.numerics import rotation
-from aerial_model.robot.robot import BASE_ORIENTATION, BASE_POSITION, JOINT_POSITION, Robot
+from aerial_model.robot.robot import BASE_ORIENTATION, JOINT_POSITION, Robot
 from aerial_model.values.estimate import Estimate
+from aerial_model.values.frame import StartFrame
 from aerial_model.values.plan import Plan
 from aerial_model.values.request import MotionRequest
 from aerial_planner.assembly import flight
@@ -407,11 +407,7 @@ class Planner:
         """Return q ``(nq,)`` of the planned robot in the start heading frame."""
         if start is None:
             return self._body.standing_configuration()
-        origin, yaw = self.robot.start_frame(start.q)
-        turn = rotation.about_z(-yaw)
-        q = np.array(start.q, dtype=float)
-        q[BASE_POSITION] = rotation.matrix(turn) @ (q[BASE_POSITION] - origin)
-        q[BASE_ORIENTATION] = rotation.multiply(turn, q[BASE_ORIENTATION])
+        q = StartFrame.of(self.robot, start.q).local(start.q)
         if q[BASE_ORIENTATION][3] < 0:  # of the two quaternions of an attitude the one that has not turned
             q[BASE_ORIENTATION] = -q[BASE_ORIENTATION]
         return np.concatenate([q[: JOINT_POSITION.start], q[JOINT_POSITION][self.robot.planned_joints]])

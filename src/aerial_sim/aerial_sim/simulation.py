@@ -27,6 +27,7 @@ from aerial_model.robot.robot import (
     Robot,
 )
 from aerial_model.values.command import Command
+from aerial_model.values.frame import StartFrame
 from aerial_model.values.measurement import Measurement
 from aerial_model.values.terrain import Terrain
 from aerial_sim.conditions import Conditions
@@ -100,7 +101,9 @@ class Simulation:
         points = self.robot.contact_positions(q)
         radii = np.array([point.radius for point in self.robot.contact_points])
         q[2] += np.max(self.terrain.height(points) - (points[:, 2] - radii))
-        self._origin, _ = self.robot.start_frame(q)  # of what an outside source reports: as of an estimator begun here
+        self._origin = StartFrame.of(
+            self.robot, q
+        ).origin  # of what an outside source reports: as of an estimator begun here
         mujoco.mj_resetData(self._world.model, self._data)
         conditions = self._conditions
         added_mass = (conditions.mass - 1.0) * self.robot.mass

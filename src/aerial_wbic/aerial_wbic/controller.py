@@ -19,6 +19,7 @@ from aerial_model.robot.posture import crouch_depth
 from aerial_model.robot.robot import BASE_ORIENTATION, BASE_POSITION, GRAVITY, JOINT_POSITION, Robot
 from aerial_model.values.command import Command
 from aerial_model.values.estimate import Estimate
+from aerial_model.values.frame import StartFrame
 from aerial_model.values.measurement import Measurement
 from aerial_model.values.plan import Plan, Track
 from aerial_wbic.behaviours.acceptance import check_start
@@ -119,8 +120,8 @@ class Controller:
         if self.estimate is None or self.phase is not Phase.STAND:
             raise RefusalError(RefusalCode.NOT_STANDING, f"the robot does not stand; its phase is {self.phase.name}")
         check_start(plan, self.estimate, self.robot, self._gains)
-        origin, self._start_heading = self.robot.start_frame(self.estimate.q)
-        self._phases.follow(plan.placed(origin, self._start_heading))
+        self._start_frame = StartFrame.of(self.robot, self.estimate.q)
+        self._phases.follow(plan.placed(self._start_frame))
 
     def abort(self) -> None:
         """Call off the motion that runs and come to rest, as long as every foot is on the ground.
@@ -219,7 +220,7 @@ class Controller:
 
     def _errors(self) -> dict[str, np.ndarray]:
         state, target = self._now
-        R_SW = rotation.matrix(rotation.about_z(-self._start_heading))
+        R_SW = self._start_frame.R_WS.T
         return {
             "com_error": R_SW @ (target.body.com - state.com),
             "com_velocity_error": R_SW @ (target.body.com_velocity - state.com_velocity),

@@ -13,8 +13,8 @@ from aerial_evaluation.bench.samples import Row
 from aerial_evaluation.bench.subject import Subject, usual_request
 from aerial_evaluation.closed_loop import Outcome, run
 from aerial_model.kinematics import Kinematics
-from aerial_model.numerics import rotation
 from aerial_model.robot.robot import BASE_TWIST, JOINT_POSITION, JOINT_VELOCITY, Robot
+from aerial_model.values.frame import StartFrame
 
 LANDING = 0.6  # after touchdown that counts as the landing [s]
 PARTS = {"base": "#8a8a8a", "legs": "#1f6f8b", "arms": "#c44e33"}
@@ -79,8 +79,7 @@ def _course(outcome: Outcome, robot: Robot) -> _Course:
     begin, end = outcome.start_time, outcome.start_time + plan.landing_time + LANDING
     truths = [tick.truth for tick in outcome.ticks if begin <= tick.truth.time < end]
     time = np.array([truth.time for truth in truths]) - begin
-    _, heading = robot.start_frame(truths[0].q)
-    R = rotation.matrix(rotation.about_z(-heading))
+    R = StartFrame.of(robot, truths[0].q).R_WS.T
     momentum: dict[str, list[np.ndarray]] = {part: [] for part in columns}
     for truth in truths:
         A = kinematics.at(truth.q, truth.v).A_G

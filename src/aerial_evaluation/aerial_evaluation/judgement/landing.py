@@ -14,6 +14,7 @@ import pinocchio as pin
 
 from aerial_model.numerics import rotation
 from aerial_model.robot.robot import BASE_ANGULAR, BASE_LINEAR, BASE_ORIENTATION, Robot
+from aerial_model.values.frame import StartFrame
 from aerial_model.values.plan import Plan
 from aerial_sim.ground_truth import GroundTruth
 
@@ -82,8 +83,7 @@ def judge(
     robot: Robot,
     plan: Plan,
     *,
-    origin: np.ndarray,
-    heading: float,
+    frame: StartFrame,
     start_time: float,
     ticks: list[Tick],
     ground_rise: float = 0.0,
@@ -93,8 +93,7 @@ def judge(
     Args:
         robot: that moved.
         plan: what it was to do, in the start heading frame.
-        origin: of the true start heading frame, in W ``(3,)`` [m].
-        heading: of that frame [rad].
+        frame: the true start heading frame.
         start_time: when the plan's time 0 was [s].
         ticks: every control period from the start of the motion to ``OBSERVE_TIME`` after its planned landing; what
             lies before or after is left out.
@@ -108,7 +107,7 @@ def judge(
     final = truths[-1]
     landing = start_time + plan.landing_time
     settled = [truth for truth in truths if truth.time > landing + SETTLE_TIME - period / 2]
-    placed = plan.placed(origin, heading)
+    placed = plan.placed(frame)
 
     airborne, touchdown = _longest_flight(np.array([truth.contact.any() for truth in truths]))
     if airborne == 0:
@@ -140,9 +139,9 @@ def judge(
         tilt=tilt,
         height=height,
         position_error=position_error,
-        rotation=rotation.matrix(rotation.about_z(-heading)) @ turned,
+        rotation=frame.R_WS.T @ turned,
         rotation_error=rotation_error,
-        apex=float(com_height.max() - origin[2]),
+        apex=float(com_height.max() - frame.origin[2]),
         peak_torque_ratio=max(truth.peak_torque_ratio for truth in truths),
         peak_voltage_ratio=max(truth.peak_voltage_ratio for truth in truths),
     )

@@ -11,6 +11,7 @@ import pinocchio as pin
 from aerial_evaluation.judgement.landing import Tick
 from aerial_model.numerics import rotation
 from aerial_model.robot.robot import BASE_ORIENTATION, Robot
+from aerial_model.values.frame import StartFrame
 from aerial_model.values.plan import Plan
 
 SAMPLES = 25  # of each phase of a run
@@ -20,7 +21,7 @@ FIGURES = ("com_m", "attitude_deg", "angular_momentum")  # the last in kg·m²/s
 
 
 def sampled(
-    robot: Robot, plan: Plan, *, origin: np.ndarray, heading: float, start_time: float, ticks: Sequence[Tick]
+    robot: Robot, plan: Plan, *, frame: StartFrame, start_time: float, ticks: Sequence[Tick]
 ) -> dict[str, dict[str, list[float]]]:
     """Return samples of every figure in every phase of a run, evenly spaced: phase → figure → values.
 
@@ -30,12 +31,11 @@ def sampled(
     Args:
         robot: that ran it.
         plan: in the start heading frame.
-        origin: of that frame, in W ``(3,)`` [m].
-        heading: of that frame [rad].
+        frame: the true start heading frame.
         start_time: when the plan began [s].
         ticks: of the run.
     """
-    placed, data = plan.placed(origin, heading), robot.model.createData()
+    placed, data = plan.placed(frame), robot.model.createData()
     time = np.array([tick.truth.time for tick in ticks]) - start_time
     ends = np.array([0.0, plan.take_off_time, plan.landing_time, plan.landing_time + CATCH_TIME])
     result = {}

@@ -18,7 +18,7 @@ import pinocchio as pin
 
 from aerial_model.config import closest, from_mapping, merged
 from aerial_model.errors import ConfigurationError
-from aerial_model.numerics.rotation import IDENTITY, heading
+from aerial_model.numerics.rotation import IDENTITY
 from aerial_model.robot.actuator import ActuatorLaw
 from aerial_model.robot.contact import ContactPoint, holding_rows
 from aerial_model.robot.loading import SECTIONS, YAML_NAME, find_folder, read_robot
@@ -202,16 +202,6 @@ class Robot:
     def holding_rows(self, held: Sequence[bool]) -> tuple[tuple[int, int], ...]:
         """Return the pairs (contact point, axis) that suffice to hold points ``(n_c,)`` still; see ``contact``."""
         return holding_rows(self.model, self.contact_frames, held, self.poses["home"])
-
-    def start_frame(self, q: np.ndarray) -> tuple[np.ndarray, float]:
-        """Return the start heading frame of a robot that stands at ``q`` ``(nq,)``.
-
-        Returns:
-            origin ``(3,)`` [m], the centre of the support on the ground, and the heading [rad], both in the frame of q.
-        """
-        radii = np.array([point.radius for point in self.contact_points])
-        origin = self.contact_positions(q).mean(axis=0) - [0.0, 0.0, radii.mean()]
-        return origin, heading(q[BASE_ORIENTATION])
 
     @staticmethod
     def load(name_or_folder: str | Path) -> Robot:

@@ -19,6 +19,7 @@ from aerial_model.numerics import rotation
 from aerial_model.numerics.components import exp_of, inverse_of, log_of, product_of, quaternion
 from aerial_model.numerics.jit import compiled
 from aerial_model.robot.robot import BASE_ORIENTATION, BASE_POSITION, JOINT_POSITION, Robot
+from aerial_model.values.frame import StartFrame
 from aerial_model.values.terrain import Terrain
 
 QUATERNION_TOLERANCE = 1e-6  # deviation of the norm from 1
@@ -167,11 +168,9 @@ class Plan:
             raise InvalidPlanError("plan field q: a base quaternion has not length 1")
         return self
 
-    def placed(self, origin: np.ndarray, yaw: float) -> Plan:
-        """Return the plan expressed in a frame where its own stands at ``origin`` ``(3,)`` [m], turned by ``yaw`` [rad]."""
-        turn = rotation.about_z(yaw)
-        R = rotation.matrix(turn)
-        origin = np.asarray(origin)
+    def placed(self, frame: StartFrame) -> Plan:
+        """Return the plan, given in its start heading frame, in the frame in which that one lies as ``frame`` says."""
+        R, origin, turn = frame.R_WS, frame.origin, frame.orientation
         q = self.q.copy()
         q[:, BASE_POSITION] = self.q[:, BASE_POSITION] @ R.T + origin
         q[:, BASE_ORIENTATION] = rotation.multiply(turn, self.q[:, BASE_ORIENTATION])
@@ -184,9 +183,9 @@ class Plan:
             foot_position=self.foot_position @ R.T + origin,
             force=self.force @ R.T,
             landing_support_centre=R @ self.landing_support_centre + origin,
-            landing_yaw=self.landing_yaw + yaw,
+            landing_yaw=self.landing_yaw + frame.heading,
             rotation=R @ self.rotation,
-            terrain=self.terrain.placed(origin, yaw),
+            terrain=self.terrain.placed(frame),
         )
 
     def sample(self, time: float) -> Target:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from aerial_model.config import frozen_array
-from aerial_model.numerics import rotation
+from aerial_model.values.frame import StartFrame
 
 PLATFORM_LENGTH = 0.9  # [m] along the jump: a stance and room to land off the goal
 PLATFORM_WIDTH = 0.9  # [m]
@@ -50,10 +50,9 @@ class Box:
         local = np.stack([c * offset[..., 0] + s * offset[..., 1], -s * offset[..., 0] + c * offset[..., 1]], axis=-1)
         return np.all(np.abs(local) <= self.size[:2] / 2 + margin, axis=-1)
 
-    def placed(self, origin: np.ndarray, yaw: float) -> Box:
-        """Return this box when the frame it is expressed in stands at ``origin`` ``(3,)`` [m], turned by ``yaw`` [rad]."""
-        centre = np.asarray(origin) + rotation.matrix(rotation.about_z(yaw)) @ self.centre
-        return Box(centre=centre, size=self.size, yaw=self.yaw + yaw)
+    def placed(self, frame: StartFrame) -> Box:
+        """Return this box, given in a start heading frame, in the frame in which that one lies as ``frame`` says."""
+        return Box(centre=frame.origin + frame.R_WS @ self.centre, size=self.size, yaw=self.yaw + frame.heading)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,10 +119,10 @@ class Terrain:
             ground = np.where(box.covers(points, margin), np.maximum(ground, box.top), ground)
         return ground
 
-    def placed(self, origin: np.ndarray, yaw: float) -> Terrain:
-        """Return the terrain expressed in a frame where its own stands at ``origin`` ``(3,)``, turned by ``yaw``."""
-        boxes = tuple(box.placed(origin, yaw) for box in self.boxes)
-        return Terrain(boxes=boxes, base=float(origin[2]) + self.base)
+    def placed(self, frame: StartFrame) -> Terrain:
+        """Return the terrain, given in a start heading frame, in the frame in which that one lies as ``frame`` says."""
+        boxes = tuple(box.placed(frame) for box in self.boxes)
+        return Terrain(boxes=boxes, base=float(frame.origin[2]) + self.base)
 
 
 def _bank(middle: float, top: float, direction: float) -> Box:

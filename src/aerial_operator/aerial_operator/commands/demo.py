@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from aerial_model.robot.robot import Robot
+from aerial_model.values.frame import StartFrame
 from aerial_model.values.request import MotionRequest
 from aerial_operator.client import connected
 from aerial_operator.console import Report, percent, say, table
@@ -109,8 +110,8 @@ def _motion_figures(robot: Robot, jump: Attempt, trial: Trial | None, args: argp
 def _draw(robot: Robot, trial: Trial, path: Path) -> Path:
     """Draw a jump on the terrain that was there."""
     done = trial.execution
-    origin, heading = robot.start_frame(trial.ticks[0].truth.q)
-    save_picture(robot, done.plan, done.plan.terrain.placed(origin, heading), trial.ticks, done.start_time, path)
+    terrain = done.plan.terrain.placed(StartFrame.of(robot, trial.ticks[0].truth.q))
+    save_picture(robot, done.plan, terrain, trial.ticks, done.start_time, path)
     return path
 
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from aerial_evaluation.judgement.landing import OBSERVE_TIME, Landing, Tick, judge
-from aerial_model.numerics import rotation
 from aerial_model.robot.robot import Robot
+from aerial_model.values.frame import StartFrame
 from aerial_model.values.plan import Plan
 from aerial_msgs.msg import ControllerStatus
 from aerial_operator.recording.recorder import Recorder
@@ -90,16 +90,16 @@ def _trial(
     truths = [truths[k] for k in seen]
     wall_time = arrivals[seen[-1]] - arrivals[seen[0]]
     statuses = [status for status in statuses if first <= from_stamp(status.stamp) <= last]
-    origin, heading = robot.start_frame(truths[0].q)
+    frame = StartFrame.of(robot, truths[0].q)
     ticks = _ticks(truths, statuses)
-    landing = judge(robot, done.plan, origin=origin, heading=heading, start_time=done.start_time, ticks=ticks)
-    end, _ = robot.start_frame(truths[-1].q)
+    landing = judge(robot, done.plan, frame=frame, start_time=done.start_time, ticks=ticks)
+    end = StartFrame.of(robot, truths[-1].q).origin
     return Trial(
         execution=done,
         ticks=ticks,
         statuses=statuses,
         landing=landing,
-        displacement=rotation.matrix(rotation.about_z(-heading)) @ (end - origin),
+        displacement=frame.R_WS.T @ (end - frame.origin),
         real_time_factor=float((truths[-1].time - truths[0].time) / wall_time),
     )
 

@@ -13,8 +13,8 @@ import numpy as np
 import pinocchio as pin
 from PIL import Image
 
-from aerial_model.numerics import rotation
-from aerial_model.robot.robot import BASE_ORIENTATION, BASE_POSITION, Robot
+from aerial_model.robot.robot import BASE_POSITION, Robot
+from aerial_model.values.frame import StartFrame
 from aerial_model.values.terrain import Terrain
 from aerial_sim.picture.raycast import Camera, render
 from aerial_sim.picture.still_life import compose
@@ -66,17 +66,13 @@ class Footage:
             take_off_time: after the start [s].
             landing_time: after the start [s].
         """
-        time, q = np.asarray(time) - start_time, np.array(q, dtype=float)
-        origin, heading = robot.start_frame(q[np.searchsorted(time, 0.0)])
-        turn = rotation.about_z(-heading)
-        R = rotation.matrix(turn)
-        q[:, BASE_POSITION] = (q[:, BASE_POSITION] - origin) @ R.T
-        q[:, BASE_ORIENTATION] = rotation.multiply(turn, q[:, BASE_ORIENTATION])
+        time = np.asarray(time) - start_time
+        frame = StartFrame.of(robot, q[np.searchsorted(time, 0.0)])
         return Footage(
             robot=robot,
-            terrain=terrain.placed(-R @ origin, -heading),
+            terrain=terrain.placed(frame.inverse),
             time=time,
-            q=q,
+            q=frame.local(q),
             take_off_time=take_off_time,
             landing_time=landing_time,
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from aerial_model.robot.robot import Robot
+from aerial_model.values.frame import StartFrame
 from aerial_model.values.terrain import Box, Terrain
 
 FOOTING = 0.02  # a foot this close to the height of a box stands on it [m]
@@ -26,11 +27,10 @@ def placed_ahead(robot: Robot, q: np.ndarray, present: Terrain, selected: Terrai
     feet = robot.contact_positions(q)
     soles = feet[:, 2] - [point.radius for point in robot.contact_points]
     kept = [box for box in present.boxes if np.any(box.covers(feet) & (np.abs(soles - box.top) < FOOTING))]
-    origin, heading = robot.start_frame(q)
-    origin = np.array([origin[0], origin[1], present.height(feet).max()])
+    frame = StartFrame.of(robot, q).on_floor(float(present.height(feet).max()))
     if selected.floor < -FOOTING:
-        return selected.placed(origin, heading)
-    new = [box.placed(origin, heading) for box in selected.boxes if box.top > FOOTING]
+        return selected.placed(frame)
+    new = [box.placed(frame) for box in selected.boxes if box.top > FOOTING]
     return Terrain(boxes=(*kept, *(_from_floor(box, present.floor) for box in new)), base=present.floor)
 
 
