@@ -220,7 +220,7 @@ class Controller:
 
     def _errors(self) -> dict[str, np.ndarray]:
         state, target = self._now
-        R_SW = self._start_frame.R_WS.T
+        R_SW = self._start_frame.R_SW
         return {
             "com_error": R_SW @ (target.body.com - state.com),
             "com_velocity_error": R_SW @ (target.body.com_velocity - state.com_velocity),

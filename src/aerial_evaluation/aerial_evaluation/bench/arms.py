@@ -79,7 +79,7 @@ def _course(outcome: Outcome, robot: Robot) -> _Course:
     begin, end = outcome.start_time, outcome.start_time + plan.landing_time + LANDING
     truths = [tick.truth for tick in outcome.ticks if begin <= tick.truth.time < end]
     time = np.array([truth.time for truth in truths]) - begin
-    R = StartFrame.of(robot, truths[0].q).R_WS.T
+    R = StartFrame.of(robot, truths[0].q).R_SW
     momentum: dict[str, list[np.ndarray]] = {part: [] for part in columns}
     for truth in truths:
         A = kinematics.at(truth.q, truth.v).A_G

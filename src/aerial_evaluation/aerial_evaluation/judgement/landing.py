@@ -139,7 +139,7 @@ def judge(
         tilt=tilt,
         height=height,
         position_error=position_error,
-        rotation=frame.R_WS.T @ turned,
+        rotation=frame.R_SW @ turned,
         rotation_error=rotation_error,
         apex=float(com_height.max() - frame.origin[2]),
         peak_torque_ratio=max(truth.peak_torque_ratio for truth in truths),

@@ -44,10 +44,14 @@ class StartFrame:
         return rotation.matrix(self.orientation)
 
     @property
+    def R_SW(self) -> np.ndarray:  # noqa: N802 (a symbol of the notation)
+        """Rotation matrix ``(3, 3)`` that maps coordinates in W to coordinates in S."""
+        return rotation.matrix(rotation.about_z(-self.heading))
+
+    @property
     def inverse(self) -> StartFrame:
         """Where W lies in S."""
-        turned = rotation.matrix(rotation.about_z(-self.heading))
-        return StartFrame(origin=-turned @ self.origin, heading=-self.heading)
+        return StartFrame(origin=-self.R_SW @ self.origin, heading=-self.heading)
 
     def local(self, q: np.ndarray) -> np.ndarray:
         """Return configurations ``(..., nq)`` expressed in S, given in W."""

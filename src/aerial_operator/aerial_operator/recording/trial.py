@@ -99,7 +99,7 @@ def _trial(
         ticks=ticks,
         statuses=statuses,
         landing=landing,
-        displacement=frame.R_WS.T @ (end - frame.origin),
+        displacement=frame.R_SW @ (end - frame.origin),
         real_time_factor=float((truths[-1].time - truths[0].time) / wall_time),
     )
 
