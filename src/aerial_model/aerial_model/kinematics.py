@@ -13,10 +13,8 @@ import pinocchio as pin
 
 from aerial_model.numerics.components import ZERO, cross_of, sum_of
 from aerial_model.numerics.jit import compiled
-from aerial_model.numerics.layout import cut, cut_rows
+from aerial_model.numerics.layout import Layout
 from aerial_model.robot.robot import BASE_ORIENTATION, GRAVITY, JOINT_VELOCITY, Robot
-
-_N, _N_C, _MASS, _HEADER = range(4)  # where a block says how many joints and contact points there are, and the mass
 
 
 class Configuration(NamedTuple):
@@ -55,50 +53,28 @@ class Configuration(NamedTuple):
         return self.J_contacts @ self.v
 
 
-@compiled
-def configuration_in(block: np.ndarray) -> Configuration:
-    """Return the configuration that lies in a block."""
-    n, n_c = int(block[_N]), int(block[_N_C])
-    nq, nv = 7 + n, 6 + n
-    q, at = cut(block, _HEADER, nq)
-    v, at = cut(block, at, nv)
-    R_WB, at = cut_rows(block, at, 3, 3)
-    M, at = cut_rows(block, at, nv, nv)
-    L, at = cut_rows(block, at, nv, nv)
-    nle, at = cut(block, at, nv)
-    com, at = cut(block, at, 3)
-    com_velocity, at = cut(block, at, 3)
-    A_G, at = cut_rows(block, at, 6, nv)
-    Adot_v_G, at = cut(block, at, 6)
-    angular_momentum, at = cut(block, at, 3)
-    contact_positions, at = cut_rows(block, at, n_c, 3)
-    J_contacts, at = cut(block, at, n_c * 3 * nv)
-    Jdot_v_contacts, at = cut_rows(block, at, n_c, 3)
-    omega_contacts, at = cut_rows(block, at, n_c, 3)
-    return Configuration(
-        q,
-        v,
-        block[_MASS],
-        R_WB,
-        M,
-        L,
-        nle,
-        com,
-        com_velocity,
-        A_G,
-        Adot_v_G,
-        angular_momentum,
-        contact_positions,
-        J_contacts.reshape((n_c, 3, nv)),
-        Jdot_v_contacts,
-        omega_contacts,
-        block,
-    )
-
-
-def _size(n: int, n_c: int) -> int:
-    nq, nv = 7 + n, 6 + n
-    return _HEADER + nq + 2 * nv + 9 + 2 * nv**2 + 3 + 3 + 6 * nv + 6 + 3 + n_c * (3 + 3 * nv + 3 + 3)
+LAYOUT = Layout(
+    sizes=("n", "n_c"),
+    numbers=("mass",),
+    arrays={
+        "q": ("7 + n",),
+        "v": ("6 + n",),
+        "R_WB": (3, 3),
+        "M": ("6 + n", "6 + n"),
+        "L": ("6 + n", "6 + n"),
+        "nle": ("6 + n",),
+        "com": (3,),
+        "com_velocity": (3,),
+        "A_G": (6, "6 + n"),
+        "Adot_v_G": (6,),
+        "angular_momentum": (3,),
+        "contact_positions": ("n_c", 3),
+        "J_contacts": ("n_c", 3, "6 + n"),
+        "Jdot_v_contacts": ("n_c", 3),
+        "omega_contacts": ("n_c", 3),
+    },
+)
+configuration_in = LAYOUT.reader(Configuration)
 
 
 class Workspace(NamedTuple):
@@ -142,10 +118,8 @@ class Kinematics:
 
     def blank(self) -> Configuration:
         """Return the memory of a configuration."""
-        n, n_c = self.robot.n_joints, self.robot.n_contacts
-        block = np.zeros(_size(n, n_c))
-        block[:_HEADER] = n, n_c, self.robot.mass
-        return configuration_in(block)
+        robot = self.robot
+        return configuration_in(LAYOUT.block(n=robot.n_joints, n_c=robot.n_contacts, mass=robot.mass))
 
     def computed(self, q: np.ndarray, v: np.ndarray) -> Workspace:
         """Return what ``fill`` needs to know about a robot at ``q`` and ``v``; the next call overwrites it."""
