@@ -10,6 +10,7 @@ from aerial_planner.formulation.limits import Margin, Variant
 from aerial_planner.kinematics.base_frame import base_frame_model
 from aerial_planner.kinematics.inverse_kinematics import InverseKinematics
 from aerial_planner.motion.schedule import contact_schedule, load_motion
+from aerial_planner.motion.start import Start
 from aerial_planner.reference.body import body_reference
 from aerial_planner.refinement import Attempt, Outcome
 
@@ -24,7 +25,7 @@ def outcome(planner):
     request, robot, settings = jump(0.3, 0.0), planner.robot, planner.settings
     result, model = planner.plan(request), base_frame_model(robot)
     schedule = contact_schedule(request, load_motion("jump", robot), robot, settings.dt, settings.flight_knots)
-    stance, ik = robot.standing_configuration(), InverseKinematics(robot, model)
+    stance, ik = Start.standing(robot), InverseKinematics(robot, model)
     return Outcome(
         attempt=Attempt(request=request, margin=Margin.usual(robot, settings)),
         from_a_plan=True,

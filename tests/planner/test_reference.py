@@ -11,6 +11,7 @@ from aerial_model.values.request import MotionRequest
 from aerial_planner.kinematics.base_frame import base_frame_model
 from aerial_planner.kinematics.inverse_kinematics import InverseKinematics
 from aerial_planner.motion.schedule import contact_schedule, load_motion
+from aerial_planner.motion.start import Start
 from aerial_planner.reference.body import body_reference
 from aerial_planner.settings import PlannerSettings
 
@@ -36,7 +37,7 @@ def schedule_of(robot, motion, displacement):
 
 def reference_of(robot, model, schedule):
     settings, ik = robot.section("planner", PlannerSettings), InverseKinematics(robot, model)
-    return body_reference(schedule, robot.standing_configuration("home"), robot, model, ik, settings)
+    return body_reference(schedule, Start.standing(robot), robot, model, ik, settings)
 
 
 def drawn_up(robot, pose, rate):

@@ -11,6 +11,7 @@ from aerial_planner.formulation.thesis_literal import LiteralProblem
 from aerial_planner.kinematics.base_frame import base_frame_model
 from aerial_planner.kinematics.inverse_kinematics import InverseKinematics
 from aerial_planner.motion.schedule import contact_schedule, load_motion
+from aerial_planner.motion.start import Start
 from aerial_planner.ocp.options import SolverOptions
 from aerial_planner.reference.body import body_reference
 from aerial_planner.settings import PlannerSettings
@@ -35,7 +36,7 @@ def both(request, robot):
     settings, model = PlannerSettings(), base_frame_model(robot)
     ik = InverseKinematics(robot, model)
     schedule = contact_schedule(wanted, load_motion(wanted.motion, robot), robot, settings.dt, settings.flight_knots)
-    reference = body_reference(schedule, robot.standing_configuration(), robot, model, ik, settings)
+    reference = body_reference(schedule, Start.standing(robot), robot, model, ik, settings)
     guess, _ = SingleRigidBody(robot, model, ik, settings, SolverOptions()).solve(schedule, reference)
     stage = KinoDynamic(robot, model, settings, variant, SolverOptions())
     reduced = stage.solve(schedule, reference, guess)

@@ -46,8 +46,9 @@ def screen(request: MotionRequest, schedule: Schedule, reference: Reference, rob
 
 def _check_stance(request: MotionRequest, reference: Reference, robot: Robot) -> None:
     """Check that the standing feet stand on the ground jumped from."""
-    heights = request.terrain.height(reference.foot_position)
-    for point, foot, height in zip(robot.contact_points, reference.foot_position, heights, strict=True):
+    feet = reference.foot_position[0]
+    heights = request.terrain.height(feet)
+    for point, foot, height in zip(robot.contact_points, feet, heights, strict=True):
         if abs(height) > _GROUND_TOLERANCE:
             raise RefusalError(
                 RefusalCode.INVALID_REQUEST,

@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 
 from aerial_model.errors import ConfigurationError, RefusalCode, RefusalError
-from aerial_model.robot.robot import BASE_ORIENTATION, JOINT_POSITION, Robot
+from aerial_model.robot.robot import Robot
 from aerial_model.values.estimate import Estimate
-from aerial_model.values.frame import StartFrame
 from aerial_model.values.plan import Plan
 from aerial_model.values.request import MotionRequest
 from aerial_planner.assembly import flight
@@ -32,6 +31,7 @@ from aerial_planner.formulation.trajectory import TakeOffTrajectory
 from aerial_planner.kinematics.base_frame import base_frame_model
 from aerial_planner.kinematics.inverse_kinematics import InverseKinematics
 from aerial_planner.motion.schedule import Motion, Schedule, contact_schedule, load_motion
+from aerial_planner.motion.start import Start
 from aerial_planner.ocp import interior_point
 from aerial_planner.ocp.options import SolverName, SolverOptions
 from aerial_planner.ocp.problem import Solution
@@ -153,13 +153,13 @@ class Planner:
         self._kino_dynamic: dict[tuple[Variant, bool], KinoDynamic] = {}
 
     def plan(
-        self, request: MotionRequest, start: Estimate | None = None, progress: Progress | None = None
+        self, request: MotionRequest, start: Start | Estimate | None = None, progress: Progress | None = None
     ) -> PlanningResult:
         """Return a checked plan.
 
         Args:
             request: motion, goal and terrain.
-            start: where the robot stands; None: its home stance.
+            start: state and contacts to start from, or the estimate of a robot that stands; None: its home stance.
             progress: called after each stage.
 
         Raises:
@@ -211,18 +211,18 @@ class Planner:
         return compiled
 
     def _plan(
-        self, request: MotionRequest, start: Estimate | None, progress: Progress, clock: _Clock
+        self, request: MotionRequest, start: Start | Estimate | None, progress: Progress, clock: _Clock
     ) -> PlanningResult:
         stage = self._stage(request)
         motion = load_motion(request.motion, self.robot)
-        q_start = self._start_configuration(start)
+        begin = self._start(start)
         first = Attempt(request=request, margin=Margin.usual(self.robot, self.settings))
         attempt, most = first, _ITERATIONS_OF_REQUEST
         good: Outcome | None = None  # the last that may be handed out, should a better one not be found
         while True:
             outcome = None
             try:
-                outcome = self._outcome(attempt, stage, motion, q_start, progress, clock)
+                outcome = self._outcome(attempt, stage, motion, begin, progress, clock)
                 better = None
                 if outcome.is_feasible and clock.iterations <= most:
                     better = outcome.attempt.improved(outcome, self.robot, self.settings, stage.variant)
@@ -263,7 +263,7 @@ class Planner:
         attempt: Attempt,
         stage: KinoDynamic,
         motion: Motion,
-        q_start: np.ndarray,
+        start: Start,
         progress: Progress,
         clock: _Clock,
     ) -> Outcome:
@@ -274,7 +274,7 @@ class Planner:
         """
         request = attempt.request
         schedule = attempt.schedule(self._schedule(request, motion, attempt.least_rise))
-        reference = body_reference(schedule, q_start, self._body, self._model, self._ik, self.settings)
+        reference = body_reference(schedule, start, self._body, self._model, self._ik, self.settings)
         screen(request, schedule, reference, self._body)
         if attempt.take_off is None:
             take_off, solution = self._take_off(request, stage, schedule, reference, progress, clock)
@@ -403,14 +403,11 @@ class Planner:
                 RefusalCode.INVALID_REQUEST, f"unknown variant '{request.variant}'; known: {known}"
             ) from None
 
-    def _start_configuration(self, start: Estimate | None) -> np.ndarray:
-        """Return q ``(nq,)`` of the planned robot in the start heading frame."""
+    def _start(self, start: Start | Estimate | None) -> Start:
+        """Return the start of the planned robot."""
         if start is None:
-            return self._body.standing_configuration()
-        q = StartFrame.of(self.robot, start.q).local(start.q)
-        if q[BASE_ORIENTATION][3] < 0:  # of the two quaternions of an attitude the one that has not turned
-            q[BASE_ORIENTATION] = -q[BASE_ORIENTATION]
-        return np.concatenate([q[: JOINT_POSITION.start], q[JOINT_POSITION][self.robot.planned_joints]])
+            return Start.standing(self._body)
+        return (Start.at(self.robot, start) if isinstance(start, Estimate) else start).planned(self.robot)
 
     def _report(
         self,

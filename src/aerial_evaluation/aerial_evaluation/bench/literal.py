@@ -9,6 +9,7 @@ from aerial_planner.formulation.srbm import SingleRigidBody
 from aerial_planner.formulation.thesis_literal import LiteralProblem, LiteralSolution
 from aerial_planner.kinematics.base_frame import base_frame_model
 from aerial_planner.kinematics.inverse_kinematics import InverseKinematics
+from aerial_planner.motion.start import Start
 from aerial_planner.ocp.options import SolverOptions
 from aerial_planner.reference.body import body_reference
 
@@ -55,6 +56,6 @@ def _solve(subject: Subject, motion: str) -> LiteralSolution:
     model = base_frame_model(robot)
     ik = InverseKinematics(robot, model)
     schedule = usual_schedule(motion, robot, settings)
-    reference = body_reference(schedule, robot.standing_configuration(), robot, model, ik, settings)
+    reference = body_reference(schedule, Start.standing(robot), robot, model, ik, settings)
     guess, _ = SingleRigidBody(robot, model, ik, settings, SolverOptions()).solve(schedule, reference)
     return LiteralProblem(robot, model, settings, Variant.AAKD_STAR, schedule, reference, guess).solve()

@@ -89,14 +89,14 @@ class KinoDynamic(KinoDynamicKinds):
         speed = self._speed
         holding = holding_joints(self.model, schedule.contact[-1])
         x_min[N, 13 + n :], x_max[N, 13 + n :] = -speed, speed
-        before = np.vstack([np.zeros(n), guess.joint_velocity[: N - 1], guess.joint_velocity[-1]])
+        before = np.vstack([reference.start_joint_velocity, guess.joint_velocity[: N - 1], guess.joint_velocity[-1]])
         x = np.hstack(
             [guess.com, guess.com_velocity, guess.angular_momentum, guess.orientation, guess.joint_position, before]
         )
         stretch, least, greatest = self._stretches(schedule, guess)  # (N+1, 0 or 1) each
         x, x_min, x_max = np.hstack([x, stretch]), np.hstack([x_min, least]), np.hstack([x_max, greatest])
         ends = np.append(np.diff(schedule.phase) != 0, False)
-        ground = np.tile(reference.foot_position, (N + 1, 1, 1))  # and above which height feet in the air must be
+        ground = reference.foot_position.copy()  # and above which height feet in the air must be
         ground[..., 2] += reference.foot_clearance
         given = [reference.com, reference.com_velocity, reference.orientation, reference.joint_position]
         p = np.hstack(
@@ -105,7 +105,7 @@ class KinoDynamic(KinoDynamicKinds):
                 *(rows[:N] for rows in given),
                 np.tile(reference.x_0[-n:], (N, 1)),
                 ground[:N].reshape(N, -1),
-                np.tile(np.concatenate([reference.x_0, np.zeros(n), margin.take_off]), (N, 1)),
+                np.tile(np.concatenate([reference.x_0, reference.start_joint_velocity, margin.take_off]), (N, 1)),
                 inertia.parameters,
             ]
         )

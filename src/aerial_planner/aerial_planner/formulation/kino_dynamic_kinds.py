@@ -325,6 +325,10 @@ class KinoDynamicKinds(Formulation):
 
 
 def _contact_sets(schedule: Schedule) -> list[tuple[tuple[bool, ...] | None, tuple[bool, ...]]]:
-    """Return for each take-off knot the contacts held since the knot before (None at the first) and those loaded."""
+    """Return for each take-off knot the points on their footholds (None at the first, whose state is given), and those loaded.
+
+    A point is on its foothold if it bore load since the knot before, or bears it from now on.
+    """
     rows = [tuple(bool(b) for b in row) for row in schedule.contact]
-    return [(None if k == 0 else rows[k - 1], rows[k]) for k in range(len(rows))]
+    standing = [tuple(bool(b) for b in row) for row in schedule.contact[1:] | schedule.contact[:-1]]
+    return list(zip([None, *standing], rows, strict=True))

@@ -195,7 +195,7 @@ class SingleRigidBody(Formulation):
 
     def _stages(self, schedule: Schedule, reference: Reference) -> list[StageData]:
         settings = self.settings
-        foot_ref = reference.foot_position.ravel()
+        foot_ref = reference.foot_position.reshape(len(schedule.contact) + 1, -1)
         push = self._pushes(schedule)
         x = np.hstack([reference.com, reference.com_velocity, reference.angular_momentum, reference.orientation])
         stages = []
@@ -204,12 +204,12 @@ class SingleRigidBody(Formulation):
         for k, loaded in enumerate(schedule.contact):
             n_f = 3 * int(loaded.sum())
             p = [[schedule.dt], reference.com[k], reference.com_velocity[k], reference.orientation[k]]
-            p += [foot_ref, reference.x_0[:13]]
+            p += [foot_ref[k], reference.x_0[:13]]
             u = push[k][loaded].ravel()
             stages.append(StageData.free(p=np.concatenate(p), x=x[k], u=u, u_min=least[:n_f], u_max=greatest[:n_f]))
         share, T = np.array([1 / schedule.flight_knots]), np.array([schedule.flight_time])
         shortest, longest = (np.array([bound]) for bound in schedule.flight_time_range)
-        p = [share, T, reference.landing_com, foot_ref]
+        p = [share, T, reference.landing_com, foot_ref[-1]]
         stages.append(StageData.free(p=np.concatenate(p), x=x[-1], u=T, u_min=shortest, u_max=longest))
         for k in range(1, schedule.flight_knots + 1):
             turned = reference.flight_orientation[k]
@@ -231,7 +231,7 @@ class SingleRigidBody(Formulation):
         x = np.array(solution.x[: N + 1])
         com, alpha, quaternion = x[:, :3], x[:, 6:9], x[:, 9:13]
         R = rotation.matrix(quaternion)  # (N+1, 3, 3)
-        feet = np.einsum("kba,kib->kia", R, reference.foot_position[None] - com[:, None])  # from the CoM, in B
+        feet = np.einsum("kba,kib->kia", R, reference.foot_position - com[:, None])  # from the CoM, in B
         q_j = self.ik.solve(feet, reference.joint_position)
         force = np.zeros((N, self.robot.n_contacts, 3))
         for k in range(N):

@@ -92,7 +92,7 @@ class LiteralProblem:
         self.flight_quaternion, self.flight_q_j = variable(4, self.M + 1), variable(n, self.M + 1)
         self.flight_omega, self.flight_time = variable(3, self.M), variable()
         self.R = [rotation_matrix(self.quaternion[:, k]) for k in range(K)]
-        gained = self.dq_j[:, :-1] - ca.horzcat(ca.MX.zeros(n, 1), self.dq_j[:, :-2])
+        gained = self.dq_j[:, :-1] - ca.horzcat(ca.DM(self.reference.start_joint_velocity), self.dq_j[:, :-2])
         gained[:, -1] = self.dq_j[:, -1] - ca.sum2(self.dq_j[:, -3:-1]) / 2  # the rates at which the contacts end
         self.ddq_j = gained / self.schedule.dt  # on each interval
         self.ddq_j_end = (self.dq_j[:, -1] - self.dq_j[:, -2]) / (0.5 * self.schedule.dt)
@@ -159,14 +159,14 @@ class LiteralProblem:
             lengths, slopes = link_slopes(self.robot, self.model, self.q_j[:, k], self.R[k])
             for i in range(self.robot.n_contacts):
                 rows = slice(3 * i, 3 * i + 3)
-                held = k > 0 and self.schedule.contact[k - 1, i]
                 loaded = k < self.N and self.schedule.contact[k, i]
+                held = k > 0 and (self.schedule.contact[k - 1, i] or loaded)
                 if held:
-                    subject_to(self.c[rows, k] == feet[i])  # (3.9a): where it stood before
+                    subject_to(self.c[rows, k] == feet[k, i])  # (3.9a)
                     if k < self.N:
                         subject_to(slopes[i] >= self.settings.link_slope)
                 elif not loaded and k > 0:
-                    rise = self.c[3 * i + 2, k] - feet[i, 2] - self.reference.foot_clearance[k, i]
+                    rise = self.c[3 * i + 2, k] - feet[k, i, 2] - self.reference.foot_clearance[k, i]
                     subject_to(rise >= 0)  # (3.10)
                     if k < self.N:
                         subject_to(rise / lengths[i] + slopes[i] >= self.settings.link_slope)

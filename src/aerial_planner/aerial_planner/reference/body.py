@@ -6,12 +6,14 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from aerial_model.numerics import rotation
 from aerial_model.robot.robot import BASE_ORIENTATION, GRAVITY, JOINT_POSITION, JOINT_VELOCITY, Robot
 from aerial_planner.kinematics.base_frame import BaseFrameModel
 from aerial_planner.kinematics.inverse_kinematics import InverseKinematics
 from aerial_planner.motion.schedule import Schedule
+from aerial_planner.motion.start import Start
 from aerial_planner.settings import PlannerSettings
 
 _TUCKED_AT = (
@@ -96,9 +98,10 @@ class Reference:
     orientation: np.ndarray  # (N+1, 4)
     flight_orientation: np.ndarray  # (M+1, 4)
     joint_position: np.ndarray  # (N+1, n) [rad]
-    foot_position: np.ndarray  # (n_c, 3) of the standing robot [m]
-    foot_clearance: np.ndarray  # (N+1, n_c) that feet in the air keep over where they stood [m]
+    foot_position: np.ndarray  # (N+1, n_c, 3) of points that bear load the foothold, of others what they are above [m]
+    foot_clearance: np.ndarray  # (N+1, n_c) height over ``foot_position`` that feet in the air keep [m]
     x_0: np.ndarray  # (13 + n,) initial state r, ṙ, α, quaternion, q_j
+    start_joint_velocity: np.ndarray  # (n,) [rad/s]
     landing_com: np.ndarray  # (3,) of the centre of mass at touchdown [m]
     landing_com_height: float  # above the landing surface, to hold after landing [m]
     landing_joint_position: np.ndarray  # (n,) [rad]
@@ -109,17 +112,17 @@ class Reference:
 
 def body_reference(
     schedule: Schedule,
-    q_start: np.ndarray,
+    start: Start,
     robot: Robot,
     model: BaseFrameModel,
     ik: InverseKinematics,
     settings: PlannerSettings,
 ) -> Reference:
-    """Return the reference of a schedule for a robot that stands at ``q_start`` ``(nq,)`` in S, at rest."""
-    q_j = q_start[JOINT_POSITION]
-    quaternion = q_start[BASE_ORIENTATION]
+    """Return the reference of a schedule from a start of ``robot``."""
+    q_j = start.q[JOINT_POSITION]
+    quaternion = start.q[BASE_ORIENTATION]
     R = rotation.matrix(quaternion)
-    feet = robot.contact_positions(q_start)
+    feet = robot.contact_positions(start.q)
     com_0 = feet[0] - R @ (model.feet_at(q_j[None])[0, 0] - model.coms(q_j[None])[0])
     landing_feet, height = _landing_stance(robot, model)
 
@@ -158,9 +161,10 @@ def body_reference(
         orientation=rotation.multiply(turn, quaternion),
         flight_orientation=rotation.multiply(rotation.exp(flight_turned[:, None] * schedule.rotation), quaternion),
         joint_position=np.tile(q_j, (N + 1, 1)),
-        foot_position=feet,
+        foot_position=np.tile(feet, (N + 1, 1, 1)),
         foot_clearance=_foot_clearance(schedule, settings),
-        x_0=np.concatenate([com_0, np.zeros(6), quaternion, q_j]),
+        x_0=np.concatenate([com_0, *_start_momentum(robot, start), quaternion, q_j]),
+        start_joint_velocity=start.v[JOINT_VELOCITY],
         landing_com=landing_com,
         landing_speed=speed,
         landing_lead_time=lead_time,
@@ -170,6 +174,12 @@ def body_reference(
             schedule, robot, stretched, landing, turning, ready, max(settings.settling_time, schedule.folding_time)
         ),
     )
+
+
+def _start_momentum(robot: Robot, start: Start) -> tuple[np.ndarray, np.ndarray]:
+    """Return the velocity ``(3,)`` [m/s] of the centre of mass and the angular momentum ``(3,)`` [kg·m²/s] about it, in S."""
+    momentum = pin.computeCentroidalMomentum(robot.model, robot.model.createData(), start.q, start.v)
+    return momentum.linear / robot.mass, momentum.angular
 
 
 def _landing_stance(robot: Robot, model: BaseFrameModel) -> tuple[np.ndarray, float]:
