@@ -14,5 +14,6 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
     ],
+    package_data={PACKAGE: ["py.typed"]},
     zip_safe=False,
 )

@@ -14,6 +14,8 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
     ],
-    package_data={PACKAGE: ["robots/*/*.urdf", "robots/*/*.yaml", "robots/*/meshes/*", "robots/*/motions/*"]},
+    package_data={
+        PACKAGE: ["py.typed", "robots/*/*.urdf", "robots/*/*.yaml", "robots/*/meshes/*", "robots/*/motions/*"]
+    },
     zip_safe=False,
 )

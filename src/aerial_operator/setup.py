@@ -15,5 +15,6 @@ setup(
         (f"share/{PACKAGE}", ["package.xml"]),
     ],
     entry_points={"console_scripts": ["aerial = aerial_operator.__main__:main"]},
+    package_data={PACKAGE: ["py.typed"]},
     zip_safe=False,
 )

@@ -14,7 +14,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
     ],
-    package_data={PACKAGE: ["motions/*.yaml"]},
+    package_data={PACKAGE: ["py.typed", "motions/*.yaml"]},
     entry_points={"console_scripts": ["planner_node = aerial_planner.ros.planner_node:main"]},
     zip_safe=False,
 )

@@ -15,5 +15,6 @@ setup(
         (f"share/{PACKAGE}", ["package.xml"]),
     ],
     entry_points={"console_scripts": ["sim_node = aerial_sim.ros.sim_node:main"]},
+    package_data={PACKAGE: ["py.typed"]},
     zip_safe=False,
 )

@@ -14,7 +14,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
     ],
-    package_data={PACKAGE: ["gains.yaml"]},
+    package_data={PACKAGE: ["py.typed", "gains.yaml"]},
     entry_points={"console_scripts": ["wbic_node = aerial_wbic.ros.wbic_node:main"]},
     zip_safe=False,
 )

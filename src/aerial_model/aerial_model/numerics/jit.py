@@ -8,19 +8,20 @@ before they are used.
 from __future__ import annotations
 
 from collections.abc import Callable
-from types import FunctionType
-from typing import Any
+from typing import Any, TypeVar
 
 from numba import config, njit
-from numba.core.dispatcher import Dispatcher
 
 from aerial_model.numerics.code_cache import LOCATORS
 
+F = TypeVar("F", bound=Callable[..., Any])
 
-def _compiled(**options: Any) -> Callable[[FunctionType], Dispatcher]:
+
+def _compiled(**options: Any) -> Callable[[F], F]:
+    """Return a decorator that has a function compiled when it is first called; to a type checker it stays the function."""
     decorate = njit(cache=True, error_model="numpy", **options)
 
-    def decorated(function: FunctionType) -> Dispatcher:
+    def decorated(function: F) -> F:
         usual, config.CACHE_LOCATOR_CLASSES = config.CACHE_LOCATOR_CLASSES, LOCATORS
         try:
             return decorate(function)
