@@ -1,7 +1,7 @@
-"""CasADi functions evaluated for many points at once in NumPy's memory.
+"""Batch evaluation: a CasADi function at many points at once, reading and writing NumPy's memory.
 
-A call that takes and returns matrices copies each entry several times, through types of CasADi's own: for small functions
-that takes longer than what they compute.
+A call of CasADi's that takes and returns matrices copies each entry several times, through types of its own: for small
+functions that takes longer than what they compute.
 """
 
 from __future__ import annotations
@@ -15,37 +15,45 @@ import numpy as np
 
 
 class Pointwise(Protocol):
-    """A function that is evaluated for n points at once, in NumPy's memory."""
+    """A function that is evaluated at n points at once, in NumPy's memory.
+
+    An argument or a result is one row of float64: its nonzeros at the first point, column by column, then those at the
+    second, and so on.
+    """
 
     def nonzeros(self, i: int) -> np.ndarray:
-        """Return row and column of each nonzero of result ``i``, ``(nnz, 2)``."""
+        """Return row and column of each nonzero of result ``i``, ``(nnz, 2)``, in the order they are written."""
 
     def bind(self, n: int, arguments: Sequence[np.ndarray], results: Sequence[np.ndarray]) -> Callable[[], object]:
-        """Return what evaluates it.
+        """Return what evaluates the function in these rows of memory, each time it is called.
 
         Args:
             n: number of points.
-            arguments: one row of numbers each, the nonzeros of all points one after another.
-            results: as ``arguments``.
+            arguments: row of each argument ``(n · nnz,)``, read.
+            results: row of each result ``(n · nnz,)``, written.
 
         Raises:
-            ValueError: if a row has not as many numbers as the function has nonzeros.
+            ValueError: if a row has not as many numbers as the function has nonzeros at n points.
         """
 
 
 class Interpreted:
-    """A function as CasADi evaluates it."""
+    """A function as CasADi's virtual machine evaluates it; a ``Pointwise`` that is always there.
+
+    Args:
+        function: to evaluate.
+    """
 
     def __init__(self, function: ca.Function) -> None:
         self._function = function
 
     def nonzeros(self, i: int) -> np.ndarray:
-        """See ``Pointwise``."""
+        """Return row and column of each nonzero of result ``i``, ``(nnz, 2)``."""
         pattern = self._function.sparsity_out(i)
         return np.column_stack([pattern.row(), pattern.get_col()]).astype(np.int64).reshape(-1, 2)
 
     def bind(self, n: int, arguments: Sequence[np.ndarray], results: Sequence[np.ndarray]) -> Callable[[], object]:
-        """See ``Pointwise``."""
+        """Return what evaluates the function in these rows of memory; see ``Pointwise.bind``."""
         mapped = self._function.map(n)
         buffer, evaluate = mapped.buffer()
         name, f = self._function.name(), mapped
@@ -54,28 +62,31 @@ class Interpreted:
         for rows, bind in ((arguments, buffer.set_arg), (results, buffer.set_res)):
             for i, row in enumerate(rows):
                 if row.size > 0:
-                    bind(i, memoryview(row.reshape(-1)))
+                    bind(i, row.reshape(-1).data)
 
-        def run(_: tuple = (mapped, buffer, arguments, results)) -> None:  # which nothing else keeps
+        def run(_: object = (mapped, buffer, arguments, results)) -> None:  # CasADi's buffer keeps none of them alive
             evaluate()
 
         return run
 
 
 class Memory(NamedTuple):
-    """What a function reads and writes for a number of points; the rows have the points one after another."""
+    """What a function reads and writes at n points, and what evaluates it there."""
 
-    arguments: list[np.ndarray]
-    results: list[np.ndarray]
+    arguments: list[np.ndarray]  # (n · nnz,) each
+    results: list[np.ndarray]  # (n · nnz,) each
     evaluate: Callable[[], object]
 
 
 class Batch:
-    """A function evaluated for however many points there are: rows in, rows out.
+    """A function of dense columns, evaluated at however many points there are: a row a point in and out.
 
     Args:
-        function: of dense columns.
-        machine_code: returns that of a function, None if there is none.
+        function: to evaluate.
+        machine_code: returns the machine code of a function, None if there is none.
+
+    Attributes:
+        function: the one given, its results dense columns; what to compile.
     """
 
     def __init__(self, function: ca.Function, machine_code: Callable[[ca.Function], Pointwise | None]) -> None:
@@ -86,16 +97,16 @@ class Batch:
         self._memory: dict[int, Memory] = {}  # by the number of points
 
     def __call__(self, *arguments: np.ndarray) -> list[np.ndarray]:
-        """Return each result ``(K, ·)``, matrices column by column, for arguments ``(K, ·)``."""
-        K = len(arguments[0])
-        memory = self.memory(K)
+        """Return each result ``(n, ·)``, matrices column by column, for arguments ``(n, ·)``."""
+        n = len(arguments[0])
+        memory = self.memory(n)
         for row, argument in zip(memory.arguments, arguments, strict=True):
             row[:] = argument.reshape(-1)
         memory.evaluate()
-        return [result.reshape(K, -1).copy() for result in memory.results]
+        return [result.reshape(n, -1).copy() for result in memory.results]
 
     def renew(self) -> None:
-        """Look for machine code again."""
+        """Look for machine code again at the next evaluation."""
         self._memory.clear()
         self.__dict__.pop("_pointwise", None)
 
@@ -104,7 +115,7 @@ class Batch:
         return self._machine_code(self.function) or Interpreted(self.function)
 
     def memory(self, n: int) -> Memory:
-        """Return the memory for n points, which is always the same."""
+        """Return the memory for n points: made at the first call, the same at later ones."""
         if n not in self._memory:
             f = self.function
             arguments = [np.zeros(n * f.nnz_in(i)) for i in range(f.n_in())]
@@ -114,11 +125,17 @@ class Batch:
 
 
 def no_machine_code(function: ca.Function) -> None:
-    """Have no machine code for any function."""
+    """Return None for any function: all are interpreted."""
 
 
 def check_sizes(name: str, rows: Sequence[np.ndarray], sizes: Sequence[int]) -> None:
-    """Raise ValueError unless the rows of a function have as many numbers as it needs."""
+    """Raise ValueError unless the rows of a function have as many numbers as it needs.
+
+    Args:
+        name: of the function, for the error's sentence.
+        rows: of memory.
+        sizes: numbers each must have.
+    """
     found = [row.size for row in rows]
     if found != list(sizes):
         raise ValueError(f"{name}: expected rows of {list(sizes)} numbers, found {found}")

@@ -1,7 +1,7 @@
-"""C source of CasADi functions, evaluated for several points at once: each variable is a vector with one number of each.
+"""C source of CasADi functions that are evaluated at several points at once: each variable is a vector, one lane a point.
 
-Derivatives of a knot are tens of thousands of operations without a branch, and the same for all knots of a kind. CasADi's
-own generator writes them for one point; here four share each instruction, which is three times as fast.
+Derivatives of a stage are tens of thousands of operations without a branch, and the same at all stages of a kind. CasADi's
+own generator writes them for one point; here four points share each instruction, which is three times as fast.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import casadi as ca
 
 LANES = 4  # points at once: more do not fit the cache, and leave more lanes empty
-_BLOCK = 300  # operations in a C function: compilers take time with the square of a function's length
+_BLOCK = 300  # operations in a C function: a compiler's time grows with the square of a function's length
 
 _EXPRESSIONS = {
     ca.OP_ASSIGN: "{0}",
@@ -69,18 +69,22 @@ static void store(long m, long left, const V *restrict from, double *restrict to
 
 
 class UnknownOperationError(ValueError):
-    """A function has an operation there is no C for here."""
+    """A function has an operation that ``source`` writes no C for."""
 
 
 def source(functions: Sequence[ca.Function]) -> str:
     """Return the C source of functions of SX.
 
     Each becomes ``void NAME(long n, const double *const *arguments, double *const *results)``, where each argument and
-    result is the nonzeros of n points, one point after the other. ``const int NAME_inputs[]`` is the number of arguments, then
-    that of the nonzeros of each; ``NAME_nonzeros[]`` for each result their number, then row and column of each.
+    result is the nonzeros at n points, one point after the other. ``const int NAME_inputs[]`` holds the number of
+    arguments, then for each its number of nonzeros; ``const int NAME_nonzeros[]`` the number of results, then for each
+    its number of nonzeros, then row and column of each.
+
+    Args:
+        functions: that are to become C, of SX expressions.
 
     Raises:
-        UnknownOperationError: if one has an operation that is not known here.
+        UnknownOperationError: if one has an operation there is no C for.
     """
     return _HEAD + "".join(_function(f) for f in functions)
 
@@ -97,14 +101,14 @@ def _function(f: ca.Function) -> str:
     lines = []
     for i, block in enumerate(blocks):
         lines += [f"static __attribute__((noinline)) void {name}_{i}({parameters}) {{", *block, "}"]
-    nonzeros = []
+    nonzeros = [f.n_out()]
     for i in range(f.n_out()):
         pattern = f.sparsity_out(i)
         pairs = zip(pattern.row(), pattern.get_col(), strict=True)
         nonzeros += [pattern.nnz(), *(index for pair in pairs for index in pair)]
     lines += [
         f"const int {name}_inputs[] = {{{', '.join(map(str, [f.n_in(), *(f.nnz_in(i) for i in range(f.n_in()))]))}}};",
-        f"const int {name}_nonzeros[] = {{{', '.join(map(str, [*nonzeros, 0]))}}};",
+        f"const int {name}_nonzeros[] = {{{', '.join(map(str, nonzeros))}}};",
         f"void {name}(long n, const double *const *arguments, double *const *results) {{",
         *(f"  static __thread V {array}[{max(size, 1)}];" for array, size in sizes),
         "  for (long k = 0; k < n; k += LANES) {",
@@ -118,7 +122,7 @@ def _function(f: ca.Function) -> str:
 
 
 def _blocks(f: ca.Function) -> list[list[str]]:
-    """Return the statements of each block; values that later blocks need go through the array ``w``."""
+    """Return the C statements of each block of operations; values that later blocks need go through the array ``w``."""
     count = f.n_instructions()
     made_by: dict[int, int] = {}  # place in CasADi's work vector ↦ the instruction whose value is there
     operands: list[list[int]] = []
@@ -151,7 +155,7 @@ def _blocks(f: ca.Function) -> list[list[str]]:
 
 
 def _statement(f: ca.Function, k: int, operands: list[str]) -> str:
-    """Return instruction ``k`` in C, its value in ``tk``."""
+    """Return CasADi's instruction ``k`` as a C statement that leaves its value in the variable ``tk``."""
     operation = f.instruction_id(k)
     if operation == ca.OP_CONST:
         constant = float(f.instruction_constant(k)).hex().replace("inf", "INFINITY").replace("nan", "NAN")

@@ -32,6 +32,7 @@ import numpy as np
 from aerial_model.robot.contact import friction_pyramid
 from aerial_model.robot.robot import GRAVITY, Robot
 from aerial_planner.codegen.library import FunctionLibrary
+from aerial_planner.formulation.attitude import require_attitude
 from aerial_planner.formulation.formulation import Formulation
 from aerial_planner.formulation.knots import FlightKnot, TakeOffKnot, foot_velocities, link_slopes, world_feet
 from aerial_planner.formulation.limits import Variant
@@ -319,7 +320,7 @@ class KinoDynamicKinds(Formulation):
             x = ca.SX.sym("x", 8 + self.robot.n_joints + len(self.robot.arms))
             goal = ca.SX.sym("goal", 4)
             rows = Rows()
-            rows.attitude(x[3:7], goal)
+            require_attitude(rows, x[3:7], goal)
             self._kinds[key] = rows.stage("touchdown", x, ca.SX(0, 1), goal, ca.SX(0), None)
         return self._kinds[key]
 

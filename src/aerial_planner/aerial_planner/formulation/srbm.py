@@ -18,6 +18,7 @@ from aerial_model.numerics import rotation
 from aerial_model.robot.contact import friction_pyramid
 from aerial_model.robot.robot import GRAVITY, Robot
 from aerial_planner.codegen.library import FunctionLibrary
+from aerial_planner.formulation.attitude import require_attitude
 from aerial_planner.formulation.formulation import Formulation
 from aerial_planner.formulation.knots import mean_com
 from aerial_planner.formulation.trajectory import TakeOffTrajectory
@@ -189,7 +190,7 @@ class SingleRigidBody(Formulation):
         if key not in self._kinds:
             x, goal = ca.SX.sym("x", 8), ca.SX.sym("goal", 4)
             rows = Rows()
-            rows.attitude(x[3:7], goal)
+            require_attitude(rows, x[3:7], goal)
             self._kinds[key] = rows.stage("body_touchdown", x, ca.SX(0, 1), goal, ca.SX(0), None)
         return self._kinds[key]
 

@@ -102,7 +102,7 @@ class FlatProgram:
         cost = ca.MX(0)
         g, gradient, jacobian, lagrangian_gradient, hessian = ([] for _ in range(5))  # lists of _Blocks
         for kind, knots in self._groups():
-            n, stage = len(knots), kind.functions()
+            n, stage = len(knots), kind.nlp_functions()
             z_0, row_0 = self._z_0[knots], self._row_0[knots]
             row_g = row_0 + kind.n_next
             z, parameters = _gather(w, z_0, kind.z.numel()), _gather(p, self._p_0[knots], kind.p.numel())

@@ -106,7 +106,7 @@ class Problem:
 
     def _evaluation_of(self, kind: StageKind) -> StageEvaluation:
         compiled = self._library.load(kind) if self._library else None
-        return compiled or kind.interpreted()
+        return StageEvaluation(*compiled) if compiled else kind.interpreted()
 
     def _excess(self, w: np.ndarray, lower: np.ndarray, upper: np.ndarray, g: np.ndarray) -> float:
         """Return the largest violation of bounds on the variables ``w`` and on the constraints ``g``."""

@@ -1,26 +1,34 @@
-"""One knot of an optimal control problem, as expressions: next state, cost, constraints; and its numbers."""
+"""One stage of an optimal control problem: its expressions (next state, cost, constraints), and its numbers.
+
+A stage kind is symbolic and made once; stage data are the numbers of one stage of one request. How derivatives are made of
+a kind's expressions is decided here; the machine code of functions on disk is found by the hash of this file, too.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cache
+from pathlib import Path
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from aerial_planner.codegen.batch import Interpreted, Pointwise
-from aerial_planner.kinematics.base_frame import conjugate, quaternion_product
-
-_SAME_TURN = 0.5  # least q_goal · q of an attitude that is the goal's
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StageKind:
-    """The expressions of one kind of knot; ``next_state`` is None at the last one.
+    """The expressions of one kind of stage; those of several stages of a problem are equal and derived once.
 
-    Constraint bounds that are numbers of the problem rather than of the request are given here. Cost and constraints may
-    say ``y`` for ``y_is``: derivatives are then made by the chain rule through few variables, which keeps them short.
+        x_next = next_state(x, u, p) ,   cost(x, u, p, y) ,   lower ≤ constraints(x, u, p, y) ≤ upper ,   y = y_is(x, u, p)
+
+    Numbers that differ between requests are parameters p; the constraints' bounds are the same in all requests. The
+    intermediate quantities y are optional: where cost and constraints depend on many variables through a few y,
+    derivatives made by the chain rule through y are shorter.
+
+    Raises:
+        ValueError: if the next state or ``y_is`` depends on y.
     """
 
     name: str
@@ -28,11 +36,11 @@ class StageKind:
     u: ca.SX  # (n_u,), possibly empty
     p: ca.SX  # (n_p,) stage parameters
     cost: ca.SX  # scalar
-    next_state: ca.SX | None
+    next_state: ca.SX | None  # (n_x of the next stage,); None at the last stage
     constraints: ca.SX  # (n_g,)
     lower: np.ndarray  # (n_g,); equal to upper: an equality
     upper: np.ndarray  # (n_g,)
-    labels: tuple[str, ...]  # what each constraint is, for people
+    labels: tuple[str, ...]  # what each constraint is, in words
     y: ca.SX = field(default_factory=lambda: ca.SX(0, 1))  # (n_y,)
     y_is: ca.SX = field(default_factory=lambda: ca.SX(0, 1))  # (n_y,) of x, u and p
 
@@ -43,7 +51,7 @@ class StageKind:
 
     @property
     def n_next(self) -> int:
-        """Number of states of the next knot."""
+        """Number of states of the next stage, 0 at the last one."""
         return 0 if self.next_state is None else self.next_state.numel()
 
     @property
@@ -55,8 +63,23 @@ class StageKind:
         """States and controls ``(n_x + n_u,)``."""
         return ca.vertcat(self.x, self.u)
 
-    def functions(self) -> StageFunctions:
-        """Return the kind's functions and derivatives; making them is what takes time in building a problem."""
+    @property
+    def batch_names(self) -> tuple[str, str]:
+        """Names of ``batch_functions``."""
+        return f"{self.name}_values", f"{self.name}_derivatives"
+
+    @property
+    def derivation(self) -> Path:
+        """Source file that derives functions from expressions."""
+        return Path(__file__)
+
+    def expressions(self) -> ca.Function:
+        """Return all that the functions are derived from, as one function (x, u, p, y) ↦ cost, constraints, y_is, …."""
+        outputs = [self.cost, self.constraints, self.y_is, *([] if self.next_state is None else [self.next_state])]
+        return ca.Function(self.name, [self.x, self.u, self.p, self.y], outputs)
+
+    def nlp_functions(self) -> StageFunctions:
+        """Return functions and derivatives as solvers of flat programs need them, each by itself; takes long."""
         z, p = self.z, self.p
         lam_f = ca.SX.sym("lam_f")
         multipliers, lagrangian, H = self._lagrangian(lam_f)
@@ -67,8 +90,8 @@ class StageKind:
             hessian=self._function("hessian", [z, p, lam_f, *multipliers], [lagrangian, H]),
         )
 
-    def together(self) -> tuple[ca.Function, ca.Function]:
-        """Return what ``StageEvaluation`` evaluates: values, and derivatives all in one, which share what they can."""
+    def batch_functions(self) -> tuple[ca.Function, ca.Function]:
+        """Return what ``StageEvaluation`` evaluates: values, and all derivatives in one function; takes long."""
         z, p = self.z, self.p
         multipliers, lagrangian, H = self._lagrangian(ca.SX(1.0))
         derivatives = [self._gradient, *self._jacobians, lagrangian, H]
@@ -78,8 +101,9 @@ class StageKind:
         )
 
     def interpreted(self) -> StageEvaluation:
-        """Return the kind's functions as CasADi evaluates them."""
-        return StageEvaluation(*map(Interpreted, self.together()))
+        """Return the kind's functions as CasADi's virtual machine evaluates them."""
+        values, derivatives = self.batch_functions()
+        return StageEvaluation(Interpreted(values), Interpreted(derivatives))
 
     @property
     def _values(self) -> list[ca.SX]:
@@ -122,7 +146,7 @@ class StageKind:
 
 @dataclass(frozen=True, kw_only=True)
 class StageFunctions:
-    """What a solver evaluates of a stage kind; z are its states and controls."""
+    """What solvers of flat programs evaluate of a stage kind; z = (x, u) are its variables."""
 
     values: ca.Function  # (z, p) ↦ cost, next state, constraints
     gradient: ca.Function  # (z, p) ↦ gradient of the cost
@@ -131,16 +155,16 @@ class StageFunctions:
 
 
 class StageEvaluation(NamedTuple):
-    """The functions of a stage kind, for many knots at once."""
+    """The functions of a stage kind, each evaluated at many stages at once; z = (x, u) are a stage's variables."""
 
     values: Pointwise  # (z, p) ↦ cost, next state, constraints
-    derivatives: (
-        Pointwise  # (z, p, λ_dynamics, λ_constraints) ↦ those of ``StageFunctions``, in its order, with λ_f = 1
-    )
+    # (z, p, λ_dynamics, λ_constraints) ↦ gradient of the cost, Jacobians of −next state and of the constraints, gradient
+    # and Hessian of the Lagrangian
+    derivatives: Pointwise
 
 
 class Rows:
-    """Constraint rows with their bounds, collected in the order the formulation states them."""
+    """Constraint rows with their bounds, collected in the order a formulation states them."""
 
     def __init__(self) -> None:
         self._expressions: list[ca.SX] = []
@@ -149,28 +173,32 @@ class Rows:
         self._labels: list[str] = []
 
     def equal(self, label: str, expression: ca.SX) -> None:
-        """Add expression = 0."""
+        """Add the constraints expression = 0, an entry each, under one label."""
         self.between(label, expression, 0.0, 0.0)
 
     def between(self, label: str, expression: ca.SX, lower: float, upper: float) -> None:
-        """Add lower ≤ expression ≤ upper."""
+        """Add the constraints lower ≤ expression ≤ upper, an entry each, under one label."""
         self._expressions.append(expression)
         self._labels += [label] * expression.numel()
         self._lower += [lower] * expression.numel()
         self._upper += [upper] * expression.numel()
 
-    def attitude(self, quaternion: ca.SX, goal: ca.SX) -> None:
-        """Add quaternion = goal, and not its negative: the attitude itself, not the one a full turn away."""
-        error = quaternion_product(conjugate(goal), quaternion)
-        self.equal("landing attitude", error[:3])
-        self.between("landing attitude", error[3], _SAME_TURN, np.inf)
-
     def stage(
-        self, name: str, x: ca.SX, u: ca.SX, p: ca.SX, cost: ca.SX, next_state: ca.SX | None, **shorthands: ca.SX
+        self, name: str, x: ca.SX, u: ca.SX, p: ca.SX, cost: ca.SX, next_state: ca.SX | None, **intermediate: ca.SX
     ) -> StageKind:
-        """Return the stage kind with these rows as its constraints; ``shorthands`` are y and y_is, if there are any."""
+        """Return the stage kind that has these rows as its constraints.
+
+        Args:
+            name: of the kind; kinds of one problem should differ in it.
+            x: symbols of the states ``(n_x,)``.
+            u: symbols of the controls ``(n_u,)``.
+            p: symbols of the parameters ``(n_p,)``.
+            cost: scalar expression.
+            next_state: expression ``(n_x of the next stage,)``; None at the last stage.
+            intermediate: y and y_is of ``StageKind``, if there are any.
+        """
         return StageKind(
-            **shorthands,
+            **intermediate,
             name=name,
             x=x,
             u=u,
@@ -186,15 +214,15 @@ class Rows:
 
 @dataclass(frozen=True, kw_only=True)
 class StageData:
-    """The numbers of one knot of one request."""
+    """The numbers of one stage of one request: parameters, bounds (a variable whose bounds are equal is fixed), guess."""
 
     p: np.ndarray  # (n_p,)
     x_min: np.ndarray  # (n_x,)
-    x_max: np.ndarray
+    x_max: np.ndarray  # (n_x,)
     u_min: np.ndarray  # (n_u,)
-    u_max: np.ndarray
-    x: np.ndarray  # guess (n_x,)
-    u: np.ndarray  # guess (n_u,)
+    u_max: np.ndarray  # (n_u,)
+    x: np.ndarray  # (n_x,) guess
+    u: np.ndarray  # (n_u,) guess
 
     @staticmethod
     def free(
@@ -207,7 +235,17 @@ class StageData:
         u_min: np.ndarray | None = None,
         u_max: np.ndarray | None = None,
     ) -> StageData:
-        """Return a knot's data with infinite bounds where none are given, and no control where none is."""
+        """Return a stage's data, with infinite bounds where none are given and no controls where no guess of them is.
+
+        Args:
+            p: parameters ``(n_p,)``.
+            x: guess of the states ``(n_x,)``.
+            u: guess of the controls ``(n_u,)``.
+            x_min: lower bounds of the states.
+            x_max: upper bounds of the states.
+            u_min: lower bounds of the controls.
+            u_max: upper bounds of the controls.
+        """
         u = np.zeros(0) if u is None else u
         return StageData(
             p=p,
@@ -222,7 +260,7 @@ class StageData:
 
 @cache
 def _infinite(n: int, sign: int) -> np.ndarray:
-    """Return n bounds that are none, to be read only."""
+    """Return n infinite bounds of a sign, to be read only."""
     bounds = np.full(n, sign * np.inf)
     bounds.flags.writeable = False
     return bounds

@@ -118,7 +118,7 @@ def test_derivatives_through_a_shorthand_are_those_without():
     nothing = ca.SX(0, 1)
     long = dataclasses.replace(short, cost=in_full[0], constraints=in_full[1], y=nothing, y_is=nothing)
     rng = np.random.default_rng(0)
-    functions = [[*kind.together(), *vars(kind.functions()).values()] for kind in (short, long)]
+    functions = [[*kind.batch_functions(), *vars(kind.nlp_functions()).values()] for kind in (short, long)]
     for ours, theirs in zip(*functions, strict=True):
         arguments = [rng.normal(size=theirs.size_in(i)) for i in range(theirs.n_in())]
         for a, b in zip(ours.call(arguments), theirs.call(arguments), strict=True):

@@ -13,10 +13,10 @@ from aerial_planner.codegen import c_source
 from aerial_planner.codegen.library import CompilationError, FunctionLibrary
 from aerial_planner.ocp.interior_point import InteriorPoint
 from aerial_planner.ocp.options import SolverOptions
-from aerial_planner.ocp.stage import Rows, StageKind
+from aerial_planner.ocp.stage import Rows, StageEvaluation, StageKind
 from aerial_planner.planner import Planner
 
-from .conftest import jump
+from ..conftest import jump
 
 
 @pytest.fixture
@@ -46,7 +46,7 @@ def test_compiled_functions_give_the_interpreted_numbers_to_the_last_bit(library
     assert library.load(kind) is None
     assert library.compile(kind)
     rng = np.random.default_rng(0)
-    for ours, theirs, function in zip(library.load(kind), kind.interpreted(), kind.together(), strict=True):
+    for ours, theirs, function in zip(library.load(kind), kind.interpreted(), kind.batch_functions(), strict=True):
         arguments = [rng.normal(size=n * function.nnz_in(i)) for i in range(function.n_in())]
         sizes = [function.nnz_out(i) for i in range(function.n_out())]
         for i, (a, b) in enumerate(
@@ -58,16 +58,16 @@ def test_compiled_functions_give_the_interpreted_numbers_to_the_last_bit(library
 
 def test_rows_of_another_size_are_refused(library, kind):
     library.compile(kind)
-    for evaluation in (library.load(kind), kind.interpreted()):
-        given, wanted = [np.zeros(6), np.zeros(2)], [np.zeros(2), np.zeros(4), np.zeros(2)]
-        evaluation.values.bind(2, given, wanted)
-        for arguments, results in (
-            (given, [*wanted[:2], np.zeros(3)]),
-            (given[:1], wanted),
-            ([np.zeros(3), given[1]], wanted),
+    for values in (library.load(kind)[0], kind.interpreted().values):
+        arguments, results = [np.zeros(6), np.zeros(2)], [np.zeros(2), np.zeros(4), np.zeros(2)]
+        values.bind(2, arguments, results)
+        for wrong in (
+            (arguments, [*results[:2], np.zeros(3)]),
+            (arguments[:1], results),
+            ([np.zeros(3), arguments[1]], results),
         ):
             with pytest.raises(ValueError, match="expected rows of"):
-                evaluation.values.bind(2, arguments, results)
+                values.bind(2, *wrong)
 
 
 def test_every_operation_there_is_c_for_is_computed_as_casadi_does(library):
@@ -128,7 +128,7 @@ def test_a_problem_solves_alike_with_compiled_functions_and_without(library, kin
     free = np.full(6 * 3 + 2, np.inf)
     outcomes = [
         InteriorPoint(kinds, evaluation_of, SolverOptions()).solve(np.zeros(len(free)), np.ones(6), -free, free)
-        for evaluation_of in (StageKind.interpreted, library.load)
+        for evaluation_of in (StageKind.interpreted, lambda kind: StageEvaluation(*library.load(kind)))
     ]
     assert outcomes[0].converged
     np.testing.assert_array_equal(outcomes[0].w, outcomes[1].w)
