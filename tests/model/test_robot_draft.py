@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aerial_model.errors import ConfigurationError
-from aerial_model.robot.draft import draft
+from aerial_model.robot.draft.draft import draft
 from aerial_model.robot.loading import known_robots
 from aerial_model.robot.robot import Robot
 

@@ -96,7 +96,7 @@ def from_mapping(cls: type[T], mapping: Any, where: str) -> T:
         raise ConfigurationError(f"{where}: {error}") from None
 
 
-def _fields(cls: type) -> tuple[list[str], list[str]]:
+def _fields(cls: Any) -> tuple[list[str], list[str]]:
     """Return the names of the fields without and with a default."""
     if not dataclasses.is_dataclass(cls):
         return [name for name in cls._fields if name not in cls._field_defaults], list(cls._field_defaults)
@@ -165,3 +165,14 @@ def frozen_array(value: Any, where: str = "array", shape: tuple[int, ...] | None
         raise ConfigurationError(f"{where}: expected shape {shape}, found {array.shape}")
     array.flags.writeable = False
     return array
+
+
+def positive(value: Any, where: str) -> float:
+    """Return ``value`` as a float.
+
+    Raises:
+        ConfigurationError: if it is no positive number.
+    """
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not value > 0:
+        raise ConfigurationError(f"{where}: expected a positive number, found {value!r}")
+    return float(value)

@@ -43,19 +43,19 @@ def _imported(module: str) -> tuple[str, ...]:
 
 @cache
 def _text(module: str) -> bytes:
-    return Path(sys.modules[module].__file__).read_bytes()
+    return Path(str(sys.modules[module].__file__)).read_bytes()
 
 
 class _MadeOfSources:
     """A locator of Numba's for which machine code is made of all sources that its function imports."""
 
     def __init__(self, py_func: FunctionType, py_file: str) -> None:
-        super().__init__(py_func, py_file)
+        super().__init__(py_func, py_file)  # type: ignore[call-arg]  # the other base's
         self._module = py_func.__module__
 
     def get_source_stamp(self) -> Any:
         """Return what changes with the sources."""
-        stamp = hashlib.sha256(str(super().get_source_stamp()).encode())
+        stamp = hashlib.sha256(str(super().get_source_stamp()).encode())  # type: ignore[misc]  # the other base's
         for name in sorted(sources(self._module)) if self._module in sys.modules else ():
             stamp.update(hashlib.sha256(_text(name)).digest())
         return stamp.digest()

@@ -98,10 +98,10 @@ def matrix_of(q: tuple) -> tuple:
     )
 
 
-def _components(a: np.ndarray) -> list:
+def _components(a: np.ndarray) -> tuple:
     """Return the slices of an array along its last axis; of a single vector as floats, whose arithmetic is fastest."""
     a = np.asarray(a, dtype=float)
-    return a.tolist() if a.ndim == 1 else list(np.moveaxis(a, -1, 0))
+    return tuple(a.tolist() if a.ndim == 1 else np.moveaxis(a, -1, 0))
 
 
 def _along_last_axis(components: Sequence) -> np.ndarray:

@@ -45,7 +45,7 @@ def holding_rows(
     pin.framesForwardKinematics(model, data, np.concatenate([np.zeros(6), [1.0], pose]))
     taken: dict[int, list[np.ndarray]] = {}  # link → orthonormal rows of those taken
     rows = []
-    for i in np.flatnonzero(held):
+    for i in (int(i) for i in np.flatnonzero(held)):
         frame = frames[i]
         basis = taken.setdefault(int(model.frames[frame].parentJoint), [])
         x, y, z = data.oMf[frame].translation - data.oMi[model.frames[frame].parentJoint].translation
@@ -57,5 +57,5 @@ def holding_rows(
             rest = row - sum(((row @ b) * b for b in basis), np.zeros(6))
             if np.linalg.norm(rest) > _INDEPENDENT:
                 basis.append(rest / np.linalg.norm(rest))
-                rows.append((int(i), axis))
+                rows.append((i, axis))
     return tuple(rows)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
+from aerial_model.robot.inverse_kinematics import least_squares
 from aerial_model.robot.robot import BASE_TWIST, Robot
 
 _ITERATIONS = 60
-_DAMPING = 1e-5  # [m²/rad²]
 _STEP_MAX = 0.3  # [rad]
 _REACHED = 1e-3  # [m]
 _HALVINGS = 10  # of the search for a depth
@@ -32,8 +32,8 @@ def reaching(robot: Robot, points: np.ndarray, guess: np.ndarray) -> tuple[np.nd
         the joint positions and the greatest distance left [m].
     """
     model, data = robot.model, robot.model.createData()
-    q_j = np.clip(guess, *robot.planning_range)
-    for _ in range(_ITERATIONS):
+
+    def residual(q_j: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         q = np.concatenate([np.zeros(6), [1.0], q_j])
         error = (points - points_from_com(robot, q_j)).ravel()
         pin.computeJointJacobians(model, data, q)
@@ -41,9 +41,10 @@ def reaching(robot: Robot, points: np.ndarray, guess: np.ndarray) -> tuple[np.nd
         J_com = pin.jacobianCenterOfMass(model, data, q)
         axes = pin.LOCAL_WORLD_ALIGNED
         J = np.vstack([pin.getFrameJacobian(model, data, f, axes)[:3] - J_com for f in robot.contact_frames])
-        J = J[:, BASE_TWIST.stop :]
-        step = np.linalg.solve(J.T @ J + _DAMPING * np.eye(len(q_j)), J.T @ error)
-        q_j = np.clip(q_j + np.clip(step, -_STEP_MAX, _STEP_MAX), *robot.planning_range)
+        return error, J[:, BASE_TWIST.stop :]
+
+    start, limits = np.clip(guess, *robot.planning_range), robot.planning_range
+    q_j = least_squares(residual, start, limits, iterations=_ITERATIONS, step_max=_STEP_MAX)
     left = np.linalg.norm(points - points_from_com(robot, q_j), axis=1)
     return q_j, float(left.max())
 

@@ -105,7 +105,7 @@ class Robot:
         Raises:
             ConfigurationError: for a missing or unknown key.
         """
-        defaults = cls.defaults(self.scale) if hasattr(cls, "defaults") else {}
+        defaults: Mapping[str, Any] = getattr(cls, "defaults", lambda scale: {})(self.scale)
         said = self.sections.get(name, {})
         if isinstance(said, Mapping):
             said = merged(defaults, said)

@@ -76,8 +76,8 @@ def resolved(name: str, folder: Path) -> Path:
 
 def root_link(tree: ElementTree.Element) -> str:
     """Return the name of the link that is nobody's child."""
-    children = {joint.find("child").get("link") for joint in tree.iter("joint") if joint.find("child") is not None}
-    return next(name for name in (link.get("name") for link in tree.iter("link")) if name not in children)
+    children = {child.get("link") for child in tree.iterfind("joint/child")}
+    return next(name for name in (link.get("name", "") for link in tree.iter("link")) if name not in children)
 
 
 def _package_roots(folder: Path) -> list[Path]:
@@ -97,7 +97,7 @@ def _found(name: str, folders: tuple[Path, ...], where: str) -> Path:
 
 
 def _fix_joints(tree: ElementTree.Element, names: Sequence[str], where: str) -> None:
-    joints = {joint.get("name"): joint for joint in tree.iter("joint")}
+    joints = {joint.get("name", ""): joint for joint in tree.iter("joint")}
     for name in names:
         if name not in joints:
             raise ConfigurationError(
@@ -122,19 +122,19 @@ def _limit_continuous_joints(tree: ElementTree.Element) -> None:
 def _set_total_mass(tree: ElementTree.Element, total_mass: float, where: str) -> None:
     """Scale mass and inertia of the root link: the same shape of another density."""
     masses = {
-        link.get("name"): float(link.find("inertial/mass").get("value"))
+        link.get("name", ""): (element, float(element.get("value", "0")))
         for link in tree.iter("link")
-        if link.find("inertial/mass") is not None
+        for element in link.iterfind("inertial/mass")
     }
     root = root_link(tree)
-    others = sum(masses.values()) - masses.get(root, 0.0)
-    if not masses.get(root) or total_mass <= others:
+    mass_of_root = masses[root][1] if root in masses else 0.0
+    others = sum(mass for _, mass in masses.values()) - mass_of_root
+    if not mass_of_root or total_mass <= others:
         raise ConfigurationError(
             f"{where}: total_mass: {total_mass} kg leave nothing for link '{root}'; all others weigh {others:.3f} kg"
         )
-    ratio = (total_mass - others) / masses[root]
-    inertial = next(link for link in tree.iter("link") if link.get("name") == root).find("inertial")
-    inertial.find("mass").set("value", repr(masses[root] * ratio))
-    inertia = inertial.find("inertia")
-    for name in _INERTIA:
-        inertia.set(name, repr(float(inertia.get(name, "0")) * ratio))
+    ratio = (total_mass - others) / mass_of_root
+    masses[root][0].set("value", repr(mass_of_root * ratio))
+    for inertia in tree.iterfind(f"link[@name='{root}']/inertial/inertia"):
+        for name in _INERTIA:
+            inertia.set(name, repr(float(inertia.get(name, "0")) * ratio))

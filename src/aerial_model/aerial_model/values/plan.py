@@ -23,6 +23,7 @@ from aerial_model.values.frame import StartFrame
 from aerial_model.values.terrain import Terrain
 
 QUATERNION_TOLERANCE = 1e-6  # deviation of the norm from 1
+TIME_TOLERANCE = 1e-9  # [s] of a sum of time steps
 _WIDTH = 7 + 6 + 9  # of a row that is interpolated, without joints: pose and twist of the base, r, ṙ, α
 
 
@@ -66,7 +67,7 @@ class Track(NamedTuple):
 def sampled(track: Track, time: float) -> Target:
     """Return a plan at ``time`` [s], held at its ends; states are interpolated between knots, forces held."""
     knots, slopes = track.knots, track.slopes
-    k = min(max(np.searchsorted(track.time, time, side="right") - 1, 0), len(slopes) - 1)
+    k = min(max(int(np.searchsorted(track.time, time, side="right")) - 1, 0), len(slopes) - 1)
     s = min(max(time - track.time[k], 0.0), track.time[k + 1] - track.time[k])
     row, slope = knots[k] + s * slopes[k], slopes[k].copy()
     share = s / (track.time[k + 1] - track.time[k])
@@ -127,12 +128,20 @@ class Plan:
             raise InvalidPlanError(
                 f"plan is for robot '{self.robot}' ({self.model_hash}), this one is '{robot.name}' ({robot.model_hash})"
             )
-        n_c, nq, nv = robot.n_contacts, robot.model.nq, robot.model.nv
-        knots = len(self.time)
-        shapes = {
+        self._check_arrays(robot)
+        self._check_numbers()
+        norms = np.linalg.norm(self.q[:, BASE_ORIENTATION], axis=1)
+        if np.any(np.abs(norms - 1) > QUATERNION_TOLERANCE):
+            raise InvalidPlanError("plan field q: a base quaternion has not length 1")
+        return self
+
+    def _check_arrays(self, robot: Robot) -> None:
+        """Check that arrays have the shapes that the robot and the number of knots ask for, and that they are finite."""
+        knots, n_c = len(self.time), robot.n_contacts
+        shapes: dict[str, tuple[int, ...]] = {
             "time": (knots,),
-            "q": (knots, nq),
-            "v": (knots, nv),
+            "q": (knots, robot.model.nq),
+            "v": (knots, robot.model.nv),
             "com": (knots, 3),
             "com_velocity": (knots, 3),
             "angular_momentum": (knots, 3),
@@ -148,25 +157,23 @@ class Plan:
             if value.shape != shape:
                 raise InvalidPlanError(f"plan field {name}: expected shape {shape}, found {value.shape}")
             if not np.all(np.isfinite(value)):
-                raise InvalidPlanError(
-                    f"plan field {name}: not finite at index {np.argwhere(~np.isfinite(value))[0].tolist()}"
-                )
+                first = np.argwhere(~np.isfinite(value))[0].tolist()
+                raise InvalidPlanError(f"plan field {name}: not finite at index {first}")
         if np.asarray(self.contact).dtype != bool:
             raise InvalidPlanError(f"plan field contact: expected truth values, found {np.asarray(self.contact).dtype}")
+
+    def _check_numbers(self) -> None:
+        """Check that times increase, that the take-off ends before the landing, and that all numbers are finite."""
         for name in ("take_off_time", "landing_time", "landing_com_height", "landing_yaw"):
             if not np.isfinite(getattr(self, name)):
                 raise InvalidPlanError(f"plan field {name}: expected a finite number, found {getattr(self, name)}")
-        if knots < 2 or np.any(np.diff(self.time) <= 0) or self.time[0] != 0.0:
+        if len(self.time) < 2 or np.any(np.diff(self.time) <= 0) or self.time[0] != 0.0:
             raise InvalidPlanError("plan field time: expected at least two times that start at 0 and increase")
-        if not 0 < self.take_off_time < self.landing_time <= self.time[-1] + 1e-9:
+        if not 0 < self.take_off_time < self.landing_time <= self.time[-1] + TIME_TOLERANCE:
             raise InvalidPlanError(
                 f"plan: expected 0 < take_off_time < landing_time ≤ last time, found {self.take_off_time}, "
                 f"{self.landing_time}, {self.time[-1]}"
             )
-        norms = np.linalg.norm(self.q[:, BASE_ORIENTATION], axis=1)
-        if np.any(np.abs(norms - 1) > QUATERNION_TOLERANCE):
-            raise InvalidPlanError("plan field q: a base quaternion has not length 1")
-        return self
 
     def placed(self, frame: StartFrame) -> Plan:
         """Return the plan, given in its start heading frame, in the frame in which that one lies as ``frame`` says."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import zipfile
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from aerial_model.values.plan import Plan
 from aerial_model.values.terrain import Box, Terrain
 
 FORMAT = 1
-_TYPES = {field.name: field.type for field in dataclasses.fields(Plan) if field.name != "terrain"}
+_TYPES = {field.name: str(field.type) for field in dataclasses.fields(Plan) if field.name != "terrain"}
 _KINDS = {"str": "U", "float": "fiu", "np.ndarray": "fiub"}  # NumPy's letters for what an entry of a type may hold
 
 
@@ -55,7 +55,7 @@ def load_plan(path: Path, robot: Robot) -> Plan:
         with path.open("rb") as file, _archive(file) as entries:
             if int(entries["format"]) != FORMAT:
                 raise InvalidPlanError(f"plan file of format {entries['format']}; this version reads {FORMAT}")
-            fields = {name: _value(name, entries[name]) for name in _TYPES}
+            fields: dict[str, Any] = {name: _value(name, entries[name]) for name in _TYPES}
             rows = zip(entries["terrain_centre"], entries["terrain_size"], entries["terrain_yaw"], strict=True)
             terrain = Terrain(boxes=tuple(Box(centre=centre, size=size, yaw=float(yaw)) for centre, size, yaw in rows))
         return Plan(**fields, terrain=terrain).checked(robot)

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from aerial_model.errors import ConfigurationError
-from aerial_model.robot.draft import draft
+from aerial_model.robot.draft.draft import draft
 from aerial_model.robot.loading import YAML_NAME
 from aerial_model.robot.urdf import resolved
 from aerial_operator.console import Report
