@@ -46,6 +46,9 @@ class Checkout:
         self.manifest = self.top / "src/aerial_sim/package.xml"
         self.manifest.parent.mkdir(parents=True)
         self.manifest.write_text("<package/>")
+        model = self.top / "src/aerial_model/aerial_model/__init__.py"
+        model.parent.mkdir(parents=True)
+        model.write_text('__version__ = "0.0.7"  # made up\n')
         self.tools.mkdir()
         for name, text in {"python3": PYTHON, "colcon": COLCON}.items():
             (self.tools / name).write_text(text)

@@ -8,6 +8,11 @@ def test_the_first_call_makes_everything_in_order(checkout):
     assert checkout.steps() == ALL_STEPS
 
 
+def test_the_version_is_told_without_setting_up(checkout):
+    assert checkout.call("--version").stdout == "aerial 0.0.7\n"
+    assert checkout.steps() == []
+
+
 def test_the_second_call_makes_nothing(checkout):
     checkout.call("plan")
     checkout.steps()

@@ -46,6 +46,8 @@ else:
         },
     )
 
+__version__ = "0.1.0"  # of the project; tests/conventions holds the manifests and the changelog to it
+
 __all__ = [
     "AerialError",
     "Box",

@@ -14,6 +14,7 @@ import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
+from aerial_model import __version__
 from aerial_model.config import closest
 from aerial_model.errors import AerialError, RefusalCode, RefusalError
 from aerial_operator.console import Report, UsageError, pairs, reserved_output, to_json
@@ -55,6 +56,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     if arguments and arguments[0] in ("-h", "--help"):
         print(_overview())
+        return 0
+    if arguments == ["--version"]:
+        print(f"aerial {__version__}")
         return 0
     parser = _Parser(prog="aerial", usage="aerial COMMAND [options]", add_help=False)
     parser.json = "--json" in arguments
@@ -118,7 +122,7 @@ def join_negative_values(arguments: Sequence[str]) -> list[str]:
 
 def _overview() -> str:
     commands = pairs([*COMMANDS.items(), *BY_SHELL.items()])
-    return f"usage: aerial COMMAND [options]\n\n{commands}\n\n`aerial COMMAND --help` lists the options of a command."
+    return f"usage: aerial COMMAND [options]\n\n{commands}\n\n`aerial COMMAND --help` lists the options of a command, `aerial --version` tells the version."
 
 
 if __name__ == "__main__":
