@@ -21,6 +21,7 @@ from aerial_model.robot.robot import JOINT_POSITION, JOINT_VELOCITY, Robot
 from aerial_model.robot.urdf import resolved
 from aerial_model.values.terrain import Terrain
 from aerial_planner.assembly.collision import CollisionModel
+from aerial_sim.conditions import PHYSICS_STEP
 from aerial_sim.world.world import build
 from aerial_wbic.controller import Controller
 
@@ -31,7 +32,6 @@ _DENSITY = 20000.0  # [kg/m³]: no link is denser than this, taken as a ball of 
 _HOLDING = 0.5  # share of a joint's torque that standing may take
 _SHALLOW = 0.15  # share of the height that legs should be able to bend
 _SPEED_GAP = 0.3  # by which no-load speed and the URDF's limit may differ
-_PHYSICS_STEP = 0.0005  # [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -269,7 +269,7 @@ def _motors(robot: Robot) -> Iterator[Finding]:
 def _models(robot: Robot) -> Iterator[Finding]:
     """Build what the nodes build."""
     for what, build_it in (
-        ("the simulator", lambda: build(robot, Terrain(), _PHYSICS_STEP)),
+        ("the simulator", lambda: build(robot, Terrain(), PHYSICS_STEP)),
         ("the collision check", lambda: CollisionModel(robot)),
         ("the controller", lambda: Controller(robot)),
     ):

@@ -9,8 +9,8 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from aerial_model.robot.scale import Scale, Unit
+from aerial_model.timing import CONTROL_PERIOD
 
-CONTROL_PERIOD = 0.002  # [s] for which a controller holds its torques: contacts that end within one push too long
 _UNITS = {
     "dt": Unit(time=1),
     "force_max": Unit(mass=1, length=1, time=-2),
@@ -74,5 +74,6 @@ class PlannerSettings:
     def defaults(scale: Scale) -> dict[str, Any]:
         """Return what a ``robot.yaml`` need not say: the numbers above, scaled."""
         numbers = scale.applied(asdict(PlannerSettings()), _UNITS)
+        # A contact that ended within a control period would push until the period is over.
         numbers["dt"] = max(1, round(numbers["dt"] / CONTROL_PERIOD)) * CONTROL_PERIOD
         return numbers

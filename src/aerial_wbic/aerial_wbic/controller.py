@@ -17,6 +17,7 @@ from aerial_model.kinematics import Configuration, Kinematics
 from aerial_model.numerics import rotation
 from aerial_model.robot.posture import crouch_depth
 from aerial_model.robot.robot import BASE_ORIENTATION, BASE_POSITION, GRAVITY, JOINT_POSITION, Robot
+from aerial_model.timing import CONTROL_PERIOD
 from aerial_model.values.command import Command
 from aerial_model.values.estimate import Estimate
 from aerial_model.values.frame import StartFrame
@@ -198,7 +199,7 @@ class Controller:
         still, joints = np.zeros(3), np.zeros(self.robot.n_joints)
         for tick in range(2):
             measurement = Measurement(
-                time=0.002 * tick,
+                time=CONTROL_PERIOD * tick,
                 sequence=tick,
                 orientation=q[BASE_ORIENTATION].copy(),
                 angular_velocity=still,
@@ -213,7 +214,7 @@ class Controller:
         wish = state, np.zeros(self.robot.model.nv), target.force, target.contact
         self._qp.within(self._drive.room(state.v, measurement), self._qp.solve(*wish), *wish)
         attitude_error(target.body.orientation, state.base_orientation)
-        for time in (0.0, 0.002):
+        for time in (0.0, CONTROL_PERIOD):
             self._sense.update(time, state, joints)
         Fold(state, 0.0, rate=1.0, pose=joints).at(0.0, state)
         Following(Track.still(self.robot.n_joints, self.robot.n_contacts), self._gains.follow).at(0.0)

@@ -17,12 +17,12 @@ from aerial_model.numerics import rotation
 from aerial_model.robot.robot import BASE_ORIENTATION, BASE_POSITION, JOINT_POSITION, JOINT_VELOCITY, Robot
 from aerial_model.values.plan import Plan
 from aerial_model.values.terrain import Terrain
+from aerial_sim.conditions import PHYSICS_STEP
 from aerial_sim.world.world import XYZW, World, build
 
 ATTITUDE_TOLERANCE = np.deg2rad(3.0)  # of the landing attitude [rad]
 POSITION_TOLERANCE = 0.03  # of the landing feet's centre [m]
 TURN_TOLERANCE = np.deg2rad(15.0)  # between planned and simulated accumulated rotation [rad]
-PHYSICS_DT = 0.0005  # [s]
 FORCE_STEPS = 10  # of the take-off's integration per interval of the plan
 STIFFNESS, DAMPING = 1e4, 200.0  # with which joints follow [1/s²], [1/s]: drift of the integration only
 GRAVITY = np.array([0.0, 0.0, -9.81])
@@ -66,7 +66,7 @@ def verify(robot: Robot, plan: Plan) -> Verification:
     """Return how a plan ends when its forces and MuJoCo integrate it; in the plan's frame, which has z up."""
     k = int(np.searchsorted(plan.time, plan.take_off_time - 1e-9))
     com, velocity, momentum = _pushed_off(robot, plan, k)
-    world = build(robot, Terrain(), PHYSICS_DT)
+    world = build(robot, Terrain(), PHYSICS_STEP)
     world.model.opt.disableflags |= _DISABLED
     flight = _Flight(world, plan)
     flight.start(k, com, velocity, momentum)
@@ -132,7 +132,7 @@ class _Flight:
         """Fly until the planned touchdown; return the rotation ``(3,)`` turned meanwhile [rad]."""
         model, data = self.world.model, self.data
         turned = np.zeros(3)
-        steps = max(1, round((self.plan.landing_time - data.time) / PHYSICS_DT))
+        steps = max(1, round((self.plan.landing_time - data.time) / PHYSICS_STEP))
         model.opt.timestep = (self.plan.landing_time - data.time) / steps
         for _ in range(steps):
             before = data.qpos[XYZW].copy()
