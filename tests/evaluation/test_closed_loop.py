@@ -3,12 +3,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from aerial_evaluation.closed_loop import Loop, terrain_in_world
-from aerial_model.numerics import rotation
-from aerial_model.robot.robot import BASE_ORIENTATION, BASE_POSITION, Robot
+from aerial_evaluation.closed_loop import Loop
+from aerial_model.robot.robot import Robot
 from aerial_model.values.command import Command
 from aerial_model.values.estimate import Estimate
-from aerial_model.values.terrain import Terrain
 from aerial_sim.simulation import Simulation
 from aerial_wbic.behaviours.phase import Phase
 
@@ -42,16 +40,6 @@ class Holder:
         return Command(torque=self._zero, position=self._home, velocity=self._zero, **gains)
 
 
-@pytest.fixture
-def standing(robot):
-    """A robot at home somewhere, heading along y."""
-    q = robot.standing_configuration()
-    turn = rotation.about_z(np.pi / 2)
-    q[BASE_POSITION] = rotation.matrix(turn) @ q[BASE_POSITION] + [1.0, 2.0, 0.0]
-    q[BASE_ORIENTATION] = turn
-    return q
-
-
 def test_a_loop_records_every_tick_and_its_duration(robot):
     loop = Loop(Simulation(robot, noise="off"), Holder(robot))
     loop.advance(0.1)
@@ -65,17 +53,3 @@ def test_a_loop_notes_the_ticks_in_which_the_controller_fell_back(robot):
     loop = Loop(Simulation(robot, noise="off"), Holder(robot))
     loop.advance(0.02)
     assert [k for k, tick in enumerate(loop.ticks) if tick.fallback] == [2]
-
-
-def test_a_platform_stands_ahead_on_the_floor(robot, standing):
-    terrain = terrain_in_world(robot, Terrain.platform(0.2, 0.3, 0.0), standing)
-    assert terrain.floor == pytest.approx(0.0)
-    assert terrain.height(np.array([1.0, 2.6])) == pytest.approx(0.2)
-    assert terrain.height(np.array([1.0, 2.0])) == pytest.approx(0.0)
-
-
-def test_a_step_down_starts_on_its_platform(robot, standing):
-    terrain = terrain_in_world(robot, Terrain.platform(-0.2, 0.3, 0.0), standing)
-    assert terrain.floor == pytest.approx(0.0)
-    assert terrain.height(np.array([1.0, 2.0])) == pytest.approx(0.2)
-    assert terrain.height(np.array([1.0, 2.6])) == pytest.approx(0.0)

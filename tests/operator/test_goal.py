@@ -7,8 +7,10 @@ import pytest
 
 from aerial_model.robot.robot import Robot
 from aerial_operator.__main__ import join_negative_values
+from aerial_operator.commands import plan, select, simulate
 from aerial_operator.console import UsageError
 from aerial_operator.options.goal import add_goal_arguments, request_from
+from aerial_operator.options.planning import planner_choices
 
 ROBOT = Robot.load("mini_cheetah")
 
@@ -93,3 +95,12 @@ def test_what_is_no_place_is_a_usage_error_with_an_example(text):
 def test_options_that_contradict_each_other_are_usage_errors(options, words):
     with pytest.raises(UsageError, match=words):
         request(f"jump --to 0.6,0 {options}")
+
+
+@pytest.mark.parametrize("command", [plan, simulate, select], ids=lambda command: command.__name__.rpartition(".")[2])
+def test_every_command_that_asks_for_a_motion_lets_the_request_choose_of_the_planner(command):
+    parser = argparse.ArgumentParser(exit_on_error=False)
+    command.add_arguments(parser)
+    args = parser.parse_args(["jump", "--variant", "KD", "--no-warm-start", "--optimize-timing"])
+    asked = request_from(args, ROBOT, **planner_choices(args))
+    assert (asked.variant, asked.warm_start, asked.optimize_timing) == ("KD", False, True)

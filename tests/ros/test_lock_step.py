@@ -1,4 +1,4 @@
-"""The three nodes in one process and in lock-step: a jump lands, and the same seed gives the same jump."""
+"""The three nodes in one process and in lock-step: a jump onto a platform lands, and the same seed gives the same jump."""
 
 import pytest
 from rclpy.node import Node
@@ -7,22 +7,25 @@ from std_srvs.srv import SetBool
 
 from aerial_evaluation.judgement.landing import OBSERVE_TIME, Tick, judge
 from aerial_model.robot.robot import Robot
+from aerial_model.timing import CONTROL_PERIOD
 from aerial_model.values.frame import StartFrame
 from aerial_model.values.request import MotionRequest
+from aerial_model.values.terrain import Terrain
 from aerial_msgs.msg import GroundTruth, JointCommand, MotionPlan, MotionResult, MotionSelection, RobotState
-from aerial_msgs.srv import Step
+from aerial_msgs.srv import SetTerrain, Step
 from aerial_planner.ros.planner_node import PlannerNode
 from aerial_ros import qos
-from aerial_ros.messages import from_stamp, plan_from_message, selection_to_message
+from aerial_ros.messages import from_stamp, plan_from_message, selection_to_message, terrain_to_message
 from aerial_sim.ros.messages import ground_truth_from_message
 from aerial_sim.ros.sim_node import SimNode
-from aerial_sim.simulation import CONTROL_DT
 from aerial_wbic.ros.wbic_node import WbicNode
 
 PATIENCE = 120.0  # [s] for a jump on a busy machine
 STAND_PERIODS = 250  # before the selection
 HEARD_SHARE = 0.9  # of states and commands: a listener beside the loop may miss some
-JUMP = MotionRequest(motion="jump", displacement=[0.3, 0.0, 0.0], request_id="jump")
+JUMP = MotionRequest(
+    motion="jump", displacement=[0.6, 0.0, 0.16], terrain=Terrain.platform(0.16, 0.38, 0.0), request_id="jump"
+)
 
 
 class Operator(Node):
@@ -79,6 +82,9 @@ def jump(executor, until):
         until(lambda: operator.count_subscribers("motion_selection") >= 2 and sim.diagnose()[1] == "paused")
         call(operator, Step, "sim/step", Step.Request(count=STAND_PERIODS))
         until(lambda: len(operator.truths) == STAND_PERIODS)
+        boxes = terrain_to_message(JUMP.terrain)
+        placing = SetTerrain.Request(frame=SetTerrain.Request.START_HEADING, boxes=boxes)
+        call(operator, SetTerrain, "sim/set_terrain", placing)
         operator.selections.publish(selection_to_message(JUMP))
         until(lambda: MotionResult.STARTED in operator.outcomes, PATIENCE)
         call(operator, SetBool, "sim/pause", SetBool.Request(data=False))
@@ -111,7 +117,7 @@ def test_a_jump_lands_and_repeats_to_the_last_bit(jump):
     )
     assert landing.failed == ()
     assert first.plans == second.plans
-    until_judged = STAND_PERIODS + round((plan.landing_time + OBSERVE_TIME) / CONTROL_DT)
+    until_judged = STAND_PERIODS + round((plan.landing_time + OBSERVE_TIME) / CONTROL_PERIOD)
     assert len(first.truths) >= until_judged
     assert len(second.truths) >= until_judged
     assert first.truths[:until_judged] == second.truths[:until_judged]

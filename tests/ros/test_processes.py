@@ -13,12 +13,14 @@ from aerial_model.errors import RefusalCode, RefusalError
 from aerial_model.robot.loading import known_robots
 from aerial_model.robot.robot import Robot
 from aerial_model.values.request import MotionRequest
+from aerial_model.values.terrain import Terrain
 from aerial_msgs.msg import ControllerStatus, MotionPlan
 from aerial_operator import client as operator_client
 from aerial_operator.client import connected
 from aerial_operator.processes import PLANNER, PROGRAMS, SIMULATOR, NodeProcesses, parameters
 from aerial_operator.recording.recorder import Recorder
 from aerial_operator.recording.trial import execution, judged
+from aerial_operator.terrain import TerrainService
 from aerial_ros import qos
 from aerial_sim.ros.messages import ground_truth_from_message
 
@@ -112,6 +114,22 @@ def test_a_goal_3_m_away_is_refused_and_the_robot_stands_on(jumped, client, stan
     _, (answer,) = client.select(MotionRequest(motion="jump", displacement=[3.0, 0.0, 0.0]))
     assert answer.outcome == "refused"
     assert answer.code in (RefusalCode.OUT_OF_REACH, RefusalCode.NO_SOLUTION)
+    assert stands_on()
+
+
+def test_the_terrain_of_a_selection_that_is_refused_is_gone_again(jumped, client, stands_on):
+    too_far = MotionRequest(motion="jump", displacement=[3.0, 0.0, 0.16], terrain=Terrain.platform(0.16, 2.5, 0.0))
+    _, (answer,) = client.select(too_far)
+    assert answer.outcome == "refused"
+    assert TerrainService(client, client.wait).place(Terrain()).boxes == []
+    assert stands_on()
+
+
+def test_terrain_that_would_run_through_the_robot_is_refused_by_the_simulator(jumped, client, stands_on):
+    onto_itself = MotionRequest(motion="jump", displacement=[0.4, 0.0, 0.16], terrain=Terrain.platform(0.16, 0.0, 0.0))
+    _, (answer,) = client.select(onto_itself)
+    assert (answer.outcome, answer.code) == ("refused", RefusalCode.INVALID_REQUEST)
+    assert "the simulator refuses the terrain: the ground under the robot's feet would rise" in answer.reason
     assert stands_on()
 
 

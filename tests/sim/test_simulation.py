@@ -10,7 +10,7 @@ from aerial_model.robot.robot import BASE_ORIENTATION, JOINT_POSITION
 from aerial_model.values.frame import StartFrame
 from aerial_model.values.measurement import Measurement
 from aerial_model.values.terrain import Box, Terrain
-from aerial_sim.conditions import Conditions
+from aerial_sim.conditions import PHYSICS_STEP, Conditions
 from aerial_sim.simulation import Simulation
 
 GRAVITY = 9.81  # [m/s²]
@@ -67,7 +67,7 @@ def test_free_fall_is_uniform_acceleration_of_the_centre_of_mass(robot, torque_c
     height = Kinematics(robot).at(*simulation.state()).com[2]
     truth = advance(simulation, torque_command(0.0), 0.3)
     fallen = height - Kinematics(robot).at(truth.q, truth.v).com[2]
-    one_step = GRAVITY * 0.3 * 0.0005  # [m] a first-order integrator's error
+    one_step = GRAVITY * 0.3 * PHYSICS_STEP  # [m] a first-order integrator's error
     assert fallen == pytest.approx(GRAVITY * 0.3**2 / 2, abs=one_step)
     assert not truth.contact.any()
 
@@ -221,6 +221,28 @@ def test_new_terrain_leaves_the_robot_as_it_is(robot, hold):
     assert simulation.terrain is ahead
     later = advance(simulation, hold, STAND_TIME)
     np.testing.assert_allclose(later.q, truth.q, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("terrain", "words"),
+    [
+        (Terrain(boxes=(Box(centre=[0.0, 0.0, 0.2], size=[0.1, 0.1, 0.4]),)), "run through the robot"),
+        (Terrain(boxes=(Box(centre=[0.45, 0.0, 0.08], size=[0.9, 0.9, 0.16]),)), "rise by 0.160 m"),
+        (Terrain(base=-0.1), "sink by 0.100 m"),
+    ],
+)
+def test_terrain_in_the_robots_place_is_refused_and_nothing_changes(robot, hold, terrain, words):
+    simulation, undisturbed = Simulation(robot, noise="off"), Simulation(robot, noise="off")
+    with pytest.raises(ConfigurationError, match=words):
+        simulation.set_terrain(terrain)
+    assert simulation.terrain == Terrain()
+    assert all(fields_equal(simulation.step(hold), undisturbed.step(hold)) for _ in range(50))
+
+
+def test_a_robot_does_not_start_inside_the_terrain(robot):
+    through_the_trunk = Terrain(boxes=(Box(centre=[0.0, 0.0, 0.2], size=[0.1, 0.1, 0.4]),))
+    with pytest.raises(ConfigurationError, match=r"where it starts \(base\)"):
+        Simulation(robot, terrain=through_the_trunk, noise="off")
 
 
 def test_a_push_moves_the_trunk_as_long_as_it_lasts(robot, torque_command):

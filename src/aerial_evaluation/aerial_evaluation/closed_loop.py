@@ -21,6 +21,7 @@ from aerial_model.values.terrain import Terrain
 from aerial_planner.planner import Planner, PlanningResult, Progress
 from aerial_sim.conditions import Conditions
 from aerial_sim.simulation import AS_EXPECTED, Simulation
+from aerial_sim.world.placement import placed
 from aerial_wbic.controller import Controller
 
 STAND_TIME = 0.5  # before the plan is asked for [s]
@@ -136,14 +137,15 @@ def run(
         RefusalError: if planner or controller refuse.
     """
     planner = planner or Planner(robot)
-    simulation = Simulation(robot, seed=seed, noise=noise, conditions=conditions)
-    if request.terrain.floor < 0:
-        simulation.set_terrain(terrain_in_world(robot, request.terrain, simulation.state()[0]))
-        simulation.reset(seed)  # onto the platform it is to jump off
+    level = Terrain(base=-request.terrain.floor)  # so that the floor of what falls away comes to lie at 0
+    simulation = Simulation(robot, terrain=level, seed=seed, noise=noise, conditions=conditions)
+    if level.base > 0:
+        simulation.set_terrain(placed(robot, simulation.state()[0], level, request.terrain))
+        simulation.reset(seed)  # onto what it is to jump off
     loop = Loop(simulation, Controller(robot))
     loop.advance(STAND_TIME)
 
-    simulation.set_terrain(terrain_in_world(robot, request.terrain, simulation.state()[0]))
+    simulation.set_terrain(placed(robot, simulation.state()[0], simulation.terrain, request.terrain))
     planning = planner.plan(request, loop.controller.estimate, progress)
     frame = StartFrame.of(robot, simulation.state()[0])
     start_time = simulation.time
@@ -174,8 +176,3 @@ def _execute(loop: Loop, plan: Plan, conditions: Conditions, seed: int) -> None:
     force = conditions.push / PUSH_TIME * np.array([np.cos(direction), np.sin(direction), 0.0])
     loop.simulation.disturb(force, PUSH_TIME, ground_rise=conditions.ground_rise)
     loop.advance(plan.landing_time + OBSERVE_TIME - apex)
-
-
-def terrain_in_world(robot: Robot, terrain: Terrain, q: np.ndarray) -> Terrain:
-    """Return a request's terrain in W, for a robot that stands at ``q`` ``(nq,)`` in W; the floor comes to lie at 0."""
-    return terrain.placed(StartFrame.of(robot, q).on_floor(-terrain.floor))

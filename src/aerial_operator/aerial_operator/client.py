@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 import uuid
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,8 +18,9 @@ from rclpy.signals import SignalHandlerOptions
 from aerial_model.errors import RefusalCode, RefusalError
 from aerial_model.values.request import ControllerCommand, MotionRequest
 from aerial_msgs.msg import ControllerStatus, MotionResult, MotionSelection
-from aerial_msgs.srv import Reset
+from aerial_msgs.srv import Reset, SetTerrain
 from aerial_operator.processes import CONTROLLER, PLANNER, PROGRAMS, SIMULATOR, NodeProgram
+from aerial_operator.terrain import TerrainService
 from aerial_ros import qos
 from aerial_ros.messages import code_from_message, from_stamp, outcome_from_message, selection_to_message
 
@@ -27,9 +28,7 @@ WARMING_UP = "warming up"  # how the planner's diagnostics begin then
 DISCOVERY_TIMEOUT = 8.0  # for a listener to be found, on a machine whose cores are busy [s]
 ACQUAINTANCE_TIMEOUT = 2.0  # for a first word of those who will answer: they know then that we listen [s]
 PLANNING_TIMEOUT = 15.0  # for a first answer; a planner that has just started builds its problems first [s]
-START_TIMEOUT = (
-    15.0  # from plan to motion; nodes that have just started must find each other first, however busy the cores [s]
-)
+START_TIMEOUT = 15.0  # from plan to motion; nodes just started find each other first, however busy the cores [s]
 MOTION_TIMEOUT = 20.0  # from start to end [s]
 DIAGNOSTICS_TIMEOUT = 5.0  # [s]
 _CHECK_PERIOD = 0.25  # [s]
@@ -122,6 +121,9 @@ class Client(Node):
     ) -> tuple[str, list[Answer]]:
         """Ask for a motion and wait until it is over.
 
+        If the robot is simulated, the terrain of the request is placed in its world first, and what was there before is put
+        back if nothing came of the request. A request without terrain leaves the world as it is.
+
         Args:
             request: its request id is chosen here.
             heard: called with each answer when it comes.
@@ -138,13 +140,31 @@ class Client(Node):
             raise _timeout(f"no {server.name} is running: nobody would answer; start one with ./aerial up")
         self.wait(lambda: self._heard(server) and self._heard(CONTROLLER), ACQUAINTANCE_TIMEOUT)
         self._results.clear()
+        answers: list[Answer] = []
+        terrain = TerrainService(self, self.wait)
+        before: SetTerrain.Request | None = None
+        if request.terrain.boxes and terrain.simulated:
+            try:
+                before = terrain.place(request.terrain)
+            except RefusalError as refusal:
+                answers.append(Answer(outcome="refused", code=refusal.code, reason=refusal.reason, after=0.0))
+                heard(answers[-1])
+                return request.request_id, answers
+        try:
+            self._ask(request, server.name, answers, heard)
+        finally:
+            if before is not None and not _began(answers):
+                with suppress(RefusalError):  # it began after all, unheard: its terrain stays
+                    terrain.call(before)
+        return request.request_id, answers
+
+    def _ask(self, request: MotionRequest, server: str, answers: list[Answer], heard: Callable[[Answer], None]) -> None:
+        """Publish a selection and add its answers to ``answers`` as they come, until the final one."""
         selected = time.monotonic()
         self._selections.publish(selection_to_message(request))
-        answers: list[Answer] = []
         while not answers or not answers[-1].final:
-            answers.append(self._next_answer(request, answers, selected, server.name))
+            answers.append(self._next_answer(request, answers, selected, server))
             heard(answers[-1])
-        return request.request_id, answers
 
     def reset_robot(self, seed: int) -> None:
         """Put the simulated robot back to its start; return when it stands there, its counters at zero.
@@ -165,7 +185,7 @@ class Client(Node):
     def _next_answer(self, request: MotionRequest, answers: list[Answer], selected: float, server: str) -> Answer:
         if not answers:
             timeout, silent = PLANNING_TIMEOUT, f"the {server} did not answer"
-        elif any(answer.outcome == "started" for answer in answers):  # of two nodes' answers, it may outrun "planned"
+        elif _began(answers):
             timeout, silent = MOTION_TIMEOUT, "the motion began, but its end was not reported"
         else:
             timeout, silent = START_TIMEOUT, f"a plan was made, but no {CONTROLLER.name} began it"
@@ -221,6 +241,11 @@ def connected(check: Callable[[], None] = lambda: None) -> Iterator[Client]:
         executor.shutdown()
         client.destroy_node()
         context.try_shutdown()
+
+
+def _began(answers: list[Answer]) -> bool:
+    """Return whether a motion has begun; of two nodes' answers, "started" may outrun "planned"."""
+    return any(answer.outcome == "started" for answer in answers)
 
 
 def _timeout(sentence: str) -> RefusalError:

@@ -60,7 +60,7 @@ CONTROLLER = NodeProgram(
     name="wbic",
     package="aerial_wbic",
     executable="wbic_node",
-    without="nobody commands the joints any more; the drives only damp them and the robot sinks down",
+    without="nobody commands the joints any more; the motor boards only damp them and the robot sinks down",
 )
 SIMULATOR = NodeProgram(
     name="sim",

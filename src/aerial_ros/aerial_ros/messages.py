@@ -20,7 +20,7 @@ from aerial_model.robot.robot import Robot
 from aerial_model.values.estimate import Estimate
 from aerial_model.values.plan import Plan
 from aerial_model.values.request import MotionRequest
-from aerial_model.values.terrain import Box, Terrain
+from aerial_model.values.terrain import BOXES_MAX, Box, Terrain
 from aerial_msgs.msg import MotionPlan, MotionResult, MotionSelection, TerrainBox
 
 NANO = 1_000_000_000
@@ -72,13 +72,25 @@ def terrain_to_message(terrain: Terrain) -> list[TerrainBox]:
     ]
 
 
-def terrain_from_message(boxes: Sequence[TerrainBox]) -> Terrain:
-    """Return a terrain.
+def terrain_from_message(boxes: Sequence[TerrainBox], base: float = 0.0) -> Terrain:
+    """Return the terrain that boxes on a floor at height ``base`` [m] make.
 
     Raises:
-        ConfigurationError, ValueError: if a box is not finite or has no extent.
+        ConfigurationError: if there are too many boxes, or one is not finite, without extent or absurdly large or far.
     """
-    return Terrain(boxes=tuple(Box(centre=np.array(box.centre), size=np.array(box.size), yaw=box.yaw) for box in boxes))
+    if len(boxes) > BOXES_MAX:  # before anything is built of them
+        raise ConfigurationError(f"expected at most {BOXES_MAX} boxes, found {len(boxes)}")
+    try:
+        return Terrain(boxes=tuple(_box_from_message(box, i) for i, box in enumerate(boxes)), base=base)
+    except ValueError as error:
+        raise ConfigurationError(str(error)) from None
+
+
+def _box_from_message(box: TerrainBox, index: int) -> Box:
+    try:
+        return Box(centre=np.array(box.centre), size=np.array(box.size), yaw=box.yaw)
+    except (ConfigurationError, ValueError) as error:
+        raise ConfigurationError(f"box {index}: {error}") from None
 
 
 def selection_to_message(request: MotionRequest) -> MotionSelection:
@@ -91,6 +103,8 @@ def selection_to_message(request: MotionRequest) -> MotionSelection:
         has_rotation=request.rotation is not None,
         rotation=float(request.rotation or 0.0),
         variant=request.variant,
+        no_warm_start=not request.warm_start,
+        optimize_timing=request.optimize_timing,
         terrain=terrain_to_message(request.terrain),
     )
 
@@ -99,7 +113,7 @@ def selection_from_message(message: MotionSelection) -> MotionRequest:
     """Return what a selection asks for.
 
     Raises:
-        RefusalError: if a number is not finite or a box has no extent.
+        RefusalError: if a number is not finite, or the terrain is none.
     """
     options = {"variant": message.variant} if message.variant else {}
     try:
@@ -110,6 +124,8 @@ def selection_from_message(message: MotionSelection) -> MotionRequest:
             yaw=message.yaw,
             rotation=message.rotation if message.has_rotation else None,
             terrain=terrain_from_message(message.terrain),
+            warm_start=not message.no_warm_start,
+            optimize_timing=message.optimize_timing,
             **options,
         )
     except (ConfigurationError, ValueError) as error:
@@ -179,7 +195,7 @@ def plan_from_message(message: MotionPlan, robot: Robot) -> Plan:
         )
     try:
         terrain = terrain_from_message(message.terrain)
-    except (ConfigurationError, ValueError) as error:
+    except ConfigurationError as error:
         raise InvalidPlanError(f"plan field terrain: {error}") from None
     plan = Plan(
         contact=_rows(message, "contact", -1).astype(bool),

@@ -19,7 +19,7 @@ class Conditions:
     mass: float = 1.0  # of the robot over its model's; the difference sits at the trunk's centre of mass
     friction: float = FRICTION_COEFFICIENT  # coefficient of the ground
     latency: float = 0.0  # from a command to its effect, in whole physics steps [s]
-    lost_commands: float = 0.0  # share of commands that never arrive; the drives keep the last
+    lost_commands: float = 0.0  # share of commands that never arrive; the motor boards keep the last
     battery: float = 1.0  # voltage over the nominal
     battery_resistance: float = 0.0  # by which the voltage sags under load [Ω]
     ground_rise: float = 0.0  # of the ground while the robot is in the air [m]

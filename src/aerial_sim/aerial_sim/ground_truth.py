@@ -21,7 +21,7 @@ class GroundTruth:
     force: np.ndarray  # (n_c, 3) of the world on the robot, in W [N]
     other_contacts: tuple[str, ...]  # links that touched the world elsewhere than at a contact point
     trunk_contact: bool  # the root link did
-    requested_torque: np.ndarray  # (n,) mean of what the drives were asked for, before any limit [N·m]
+    requested_torque: np.ndarray  # (n,) mean of what the motor boards were asked for, before any limit [N·m]
     delivered_torque: np.ndarray  # (n,) mean of what they gave [N·m]
     peak_torque_ratio: float  # largest requested torque over its limit, over joints and physics steps
-    peak_voltage_ratio: float  # the same for the voltage the requested torque needs
+    peak_voltage_ratio: float  # largest voltage that the requested torque needs, over the bus voltage

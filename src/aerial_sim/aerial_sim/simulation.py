@@ -1,7 +1,6 @@
-"""The robot's stand-in: torque commands in, measurements out, the actuator law between, MuJoCo below.
+"""The simulated robot: commands in, measurements out, the actuator law between, MuJoCo below.
 
-One ``step`` is one control period. Within it the drives close their own loop at every physics step, as motor boards
-do: set-point to requested torque, the actuator law to delivered torque, MuJoCo to motion. Equal seeds and equal
+One ``step`` is one control period. Within it the motor boards close their own loop at every physics step: set-point to requested torque, the actuator law to delivered torque, MuJoCo to motion. Equal seeds and equal
 commands give equal measurements to the last bit.
 """
 
@@ -26,20 +25,22 @@ from aerial_model.robot.robot import (
     JOINT_VELOCITY,
     Robot,
 )
+from aerial_model.timing import CONTROL_PERIOD
 from aerial_model.values.command import Command
 from aerial_model.values.frame import StartFrame
 from aerial_model.values.measurement import Measurement
 from aerial_model.values.terrain import Terrain
 from aerial_sim.conditions import Conditions
 from aerial_sim.ground_truth import GroundTruth
-from aerial_sim.robot_side.motor_board import Drive
+from aerial_sim.robot_side.motor_board import MotorBoards
 from aerial_sim.robot_side.sensors import SensorNoise, Sensors
-from aerial_sim.world.contacts import ContactSensing
+from aerial_sim.world.contacts import ContactSensing, links_inside_boxes
+from aerial_sim.world.placement import GROUND_SHIFT_MAX, ground_shift
 from aerial_sim.world.world import World, build
 
-CONTROL_DT = 0.002  # [s]
 FLAT = Terrain()
 AS_EXPECTED = Conditions()
+_WHOLE_STATE = mujoco.mjtState.mjSTATE_INTEGRATION  # all that the next step depends on
 START_OFFSET = np.radians(1.0)  # largest error of the joints' starting positions with noise [rad]
 
 
@@ -52,10 +53,11 @@ class Simulation:
         noise: ``"nominal"`` or ``"off"``; ``"off"`` also starts exactly in the home pose, heading along x.
         seed: of noise, biases, starting joint offsets and heading.
         control_dt: period of commands and measurements, a multiple of the physics step [s].
-        conditions: of battery, drives, robot and ground, from the start on, and MuJoCo's step.
+        conditions: of battery, motor boards, robot and ground, from the start on, and MuJoCo's step.
 
     Raises:
-        ConfigurationError: for an unknown noise, periods that do not fit, or a URDF that MuJoCo cannot use.
+        ConfigurationError: for an unknown noise, periods that do not fit, a URDF that MuJoCo cannot use, or a terrain
+            that runs through the robot.
     """
 
     def __init__(
@@ -65,7 +67,7 @@ class Simulation:
         terrain: Terrain = FLAT,
         noise: str = "nominal",
         seed: int = 0,
-        control_dt: float = CONTROL_DT,
+        control_dt: float = CONTROL_PERIOD,
         conditions: Conditions = AS_EXPECTED,
     ) -> None:
         physics_dt = conditions.physics_step
@@ -82,9 +84,14 @@ class Simulation:
         self._conditions = conditions
         self._latency_steps = round(conditions.latency / physics_dt)
         law = dataclasses.replace(robot.actuators, bus_voltage=conditions.battery * robot.actuators.bus_voltage)
-        self._drive = Drive(law, steps, conditions.battery_resistance)
-        self._use(build(robot, terrain, physics_dt))
+        self._motor_boards = MotorBoards(law, steps, conditions.battery_resistance)
+        self._world: World = build(robot, terrain, physics_dt)
+        self._data = mujoco.MjData(self._world.model)
+        self._contacts = ContactSensing(self._world)
         self.reset(seed)
+        inside = links_inside_boxes(self._world, self._data)
+        if inside:
+            raise ConfigurationError(f"the terrain would run through the robot where it starts ({', '.join(inside)})")
 
     def reset(self, seed: int) -> Measurement:
         """Put the robot in its home pose, its lowest foot on the ground, at time 0, and draw everything anew.
@@ -101,9 +108,7 @@ class Simulation:
         points = self.robot.contact_positions(q)
         radii = np.array([point.radius for point in self.robot.contact_points])
         q[2] += np.max(self.terrain.height(points) - (points[:, 2] - radii))
-        self._origin = StartFrame.of(
-            self.robot, q
-        ).origin  # of what an outside source reports: as of an estimator begun here
+        self._origin = StartFrame.of(self.robot, q).origin  # of the outside localization: as of an estimator begun here
         mujoco.mj_resetData(self._world.model, self._data)
         conditions = self._conditions
         added_mass = (conditions.mass - 1.0) * self.robot.mass
@@ -114,7 +119,7 @@ class Simulation:
         self._losses = np.random.default_rng([seed, 1])  # apart from the sensors': they stay as they are without losses
         self._pending: deque[tuple[int, Command]] = deque()  # commands under way, with the physics step they arrive at
         self._in_force: Command | None = None
-        self._drive.clear()
+        self._motor_boards.clear()
         self._contacts.clear()
         self._contacts.collect(self._data)
         self._measurement = self._measured(-self._world.model.opt.gravity)
@@ -145,7 +150,9 @@ class Simulation:
         self._send(command)
         for k in range(self._steps):
             in_force = self._arrived(self._ticks * self._steps + k)
-            data.ctrl[:] = self._drive.torque(k, in_force, data.qpos[world.joint_qpos], data.qvel[world.joint_dof])
+            data.ctrl[:] = self._motor_boards.torque(
+                k, in_force, data.qpos[world.joint_qpos], data.qvel[world.joint_dof]
+            )
             mujoco.mj_step(model, data)
             self._contacts.collect(data)
         self._ticks += 1
@@ -154,16 +161,17 @@ class Simulation:
         return self._measurement
 
     def _send(self, command: Command) -> None:
-        """Put a command on its way to the drives; the first is there at once: they have held the robot until now."""
+        """Put a command on its way to the motor boards; the first is there at once: they have held the robot until now."""
         if self._in_force is None:
             self._in_force = command
         elif self._conditions.lost_commands == 0 or self._losses.random() >= self._conditions.lost_commands:
             self._pending.append((self._ticks * self._steps + self._latency_steps, command))
 
     def _arrived(self, step: int) -> Command:
-        """Return the newest command that has arrived by physics step ``step``."""
+        """Return the newest command that has arrived by physics step ``step``; one has been there since ``_send``."""
         while self._pending and self._pending[0][0] <= step:
             self._in_force = self._pending.popleft()[1]
+        assert self._in_force is not None
         return self._in_force
 
     def measure(self) -> Measurement:
@@ -171,13 +179,27 @@ class Simulation:
         return self._measurement
 
     def set_terrain(self, terrain: Terrain) -> None:
-        """Replace the terrain (in W) under the running robot; its state, the time and all disturbances stay."""
-        state = np.empty(mujoco.mj_stateSize(self._world.model, mujoco.mjtState.mjSTATE_INTEGRATION))
-        mujoco.mj_getState(self._world.model, self._data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
-        self._use(build(self.robot, terrain, self._physics_dt))
-        self._apply_disturbances()
-        mujoco.mj_setState(self._world.model, self._data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
-        mujoco.mj_forward(self._world.model, self._data)
+        """Replace the terrain (in W) around the robot; its state, the time and all disturbances stay.
+
+        Raises:
+            ConfigurationError: if the terrain would run through the robot or take the ground from under its feet;
+                nothing changes then.
+        """
+        shift = ground_shift(self.robot, self.state()[0], self.terrain, terrain)
+        if abs(shift) > GROUND_SHIFT_MAX:
+            change = "rise" if shift > 0 else "sink"
+            raise ConfigurationError(f"the ground under the robot's feet would {change} by {abs(shift):.3f} m")
+        world = build(self.robot, terrain, self._physics_dt)
+        data = mujoco.MjData(world.model)
+        self._apply_disturbances(world)
+        state = np.empty(mujoco.mj_stateSize(self._world.model, _WHOLE_STATE))
+        mujoco.mj_getState(self._world.model, self._data, state, _WHOLE_STATE)
+        mujoco.mj_setState(world.model, data, state, _WHOLE_STATE)
+        mujoco.mj_forward(world.model, data)
+        inside = set(links_inside_boxes(world, data)) - set(links_inside_boxes(self._world, self._data))
+        if inside:
+            raise ConfigurationError(f"the terrain would run through the robot ({', '.join(sorted(inside))})")
+        self._world, self._data, self._contacts = world, data, ContactSensing(world)
         self._contacts.collect(self._data)
 
     def disturb(
@@ -201,9 +223,10 @@ class Simulation:
         Raises:
             ConfigurationError: if the trunk would have no mass left; nothing changes then.
         """
-        if added_mass is not None and self._trunk_mass + added_mass <= 0:
+        trunk_mass = self._world.trunk_mass
+        if added_mass is not None and trunk_mass + added_mass <= 0:
             raise ConfigurationError(
-                f"added mass: {added_mass:.2f} kg would leave nothing of the trunk's {self._trunk_mass:.2f} kg"
+                f"added mass: {added_mass:.2f} kg would leave nothing of the trunk's {trunk_mass:.2f} kg"
             )
         if force is not None:
             self._data.xfrc_applied[self._world.trunk, :3] = force
@@ -214,7 +237,7 @@ class Simulation:
             self._friction_coefficient = friction_coefficient
         if ground_rise is not None:
             self._ground_rise = ground_rise
-        self._apply_disturbances()
+        self._apply_disturbances(self._world)
 
     def ground_truth(self) -> GroundTruth:
         """Return what is really so, contacts and torques over the last control period included."""
@@ -228,10 +251,10 @@ class Simulation:
             force=self._contacts.forces(self._data),
             other_contacts=other_links,
             trunk_contact=self._world.trunk_name in other_links,
-            requested_torque=self._drive.requested_torque,
-            delivered_torque=self._drive.delivered_torque,
-            peak_torque_ratio=self._drive.peak_torque_ratio,
-            peak_voltage_ratio=self._drive.peak_voltage_ratio,
+            requested_torque=self._motor_boards.requested_torque,
+            delivered_torque=self._motor_boards.delivered_torque,
+            peak_torque_ratio=self._motor_boards.peak_torque_ratio,
+            peak_voltage_ratio=self._motor_boards.peak_voltage_ratio,
         )
 
     def state(self) -> tuple[np.ndarray, np.ndarray]:
@@ -254,7 +277,7 @@ class Simulation:
         rate does, so that its integral is the true change of velocity, impacts included.
         """
         q, v = self.state()
-        torque = self._drive.delivered_torque
+        torque = self._motor_boards.delivered_torque
         return Measurement(
             time=self.time,
             orientation=self._sensors.orientation(q[BASE_ORIENTATION]),
@@ -273,25 +296,19 @@ class Simulation:
         mujoco.mju_quat2Mat(R, self._data.qpos[BASE_ORIENTATION])
         return R.reshape(3, 3)
 
-    def _use(self, world: World) -> None:
-        """Make ``world`` the current one."""
-        self._world = world
-        self._data = mujoco.MjData(world.model)
-        self._contacts = ContactSensing(world)
-        self._trunk_mass = float(world.model.body_mass[world.trunk])
-        self._ground_height = world.model.geom_pos[world.ground_geoms, 2].copy()
-
-    def _apply_disturbances(self) -> None:
-        """Give the model the added mass and the ground's friction and height asked for."""
-        model = self._world.model
-        model.geom_friction[self._world.ground_geoms, 0] = self._friction_coefficient
-        model.geom_pos[self._world.ground_geoms, 2] = self._ground_height + self._ground_rise
-        model.body_mass[self._world.trunk] = self._trunk_mass + self._added_mass
+    def _apply_disturbances(self, world: World) -> None:
+        """Give a world's model the added mass and the ground's friction and height asked for."""
+        model = world.model
+        model.geom_friction[world.ground_geoms, 0] = self._friction_coefficient
+        model.geom_pos[world.ground_geoms, 2] = world.ground_height + self._ground_rise
+        model.body_mass[world.trunk] = world.trunk_mass + self._added_mass
         mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
 @compiled
-def _state(qpos: np.ndarray, qvel: np.ndarray, joint_qpos: np.ndarray, joint_dof: np.ndarray) -> tuple:
+def _state(
+    qpos: np.ndarray, qvel: np.ndarray, joint_qpos: np.ndarray, joint_dof: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return q and v in Pinocchio's order. MuJoCo has a quaternion's w first, and the base's linear velocity in W."""
     n = len(joint_qpos)
     q, v = np.empty(7 + n), np.empty(6 + n)

@@ -19,6 +19,10 @@ HURDLE_THICKNESS = 0.03  # [m]
 HURDLE_WIDTH = 0.9  # [m]
 BANK_LENGTH = 1.5  # of the ground on either side of a gap, along the jump [m]
 BANK_WIDTH = 0.9  # [m]
+BOXES_MAX = 64  # of a terrain: more, and a simulator cannot keep the robot's pace
+BOX_SIDE_MIN, BOX_SIDE_MAX = 1e-3, 100.0  # of a box [m]: what a foot can feel, and what a robot can cross
+DISTANCE_MAX = 1000.0  # of a box's centre or a floor from the origin, along each axis [m]
+YAW_MAX = 100.0  # either way: more has lost its digits [rad]
 GAP_DEPTH = 0.3  # [m] about the height a robot here stands at: who falls in has not landed
 
 
@@ -33,10 +37,14 @@ class Box:
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", frozen_array(self.centre, "box centre", (3,)))
         object.__setattr__(self, "size", frozen_array(self.size, "box size", (3,)))
-        if np.any(self.size <= 0) or not np.isfinite(self.yaw):
+        if not (self.size.min() >= BOX_SIDE_MIN and self.size.max() <= BOX_SIDE_MAX):
             raise ValueError(
-                f"a box needs positive side lengths and a finite yaw, found size {self.size}, yaw {self.yaw}"
+                f"box size: expected positive side lengths from {BOX_SIDE_MIN} to {BOX_SIDE_MAX:.0f} m, found {self.size}"
             )
+        if np.abs(self.centre).max() > DISTANCE_MAX:
+            raise ValueError(f"box centre: expected at most {DISTANCE_MAX:.0f} m along each axis, found {self.centre}")
+        if not abs(self.yaw) <= YAW_MAX:
+            raise ValueError(f"box yaw: expected a finite angle of at most {YAW_MAX:.0f} rad, found {self.yaw}")
 
     @property
     def top(self) -> float:
@@ -61,6 +69,12 @@ class Terrain:
 
     boxes: tuple[Box, ...] = field(default_factory=tuple)
     base: float = 0.0  # height of the floor, unless a box reaches deeper [m]
+
+    def __post_init__(self) -> None:
+        if len(self.boxes) > BOXES_MAX:
+            raise ValueError(f"boxes: expected at most {BOXES_MAX}, found {len(self.boxes)}")
+        if not abs(self.base) <= DISTANCE_MAX:
+            raise ValueError(f"base: expected a finite height of at most {DISTANCE_MAX:.0f} m, found {self.base}")
 
     @staticmethod
     def platform(height: float, edge: float, direction: float) -> Terrain:

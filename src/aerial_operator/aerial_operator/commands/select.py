@@ -9,17 +9,18 @@ from aerial_model.values.request import ControllerCommand
 from aerial_operator.client import connected
 from aerial_operator.console import Report, say
 from aerial_operator.options.goal import add_goal_arguments, request_from
+from aerial_operator.options.planning import add_choice_arguments, planner_choices
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the goal."""
+    """Add the goal and what may be chosen of the planner."""
     add_goal_arguments(parser, more=f"; or for the controller alone: {', '.join(ControllerCommand)}")
-    parser.add_argument("--variant", metavar="KD|AAKD|AAKD*", default="AAKD*", help="of the planner (default: AAKD*)")
+    add_choice_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> Report:
     """Publish the selection and wait for its answers."""
-    request = request_from(args, Robot.load(args.robot), variant=args.variant)
+    request = request_from(args, Robot.load(args.robot), **planner_choices(args))
     with connected() as client:
         request_id, answers = client.select(request, heard=lambda answer: say(str(answer)))
     last = answers[-1]

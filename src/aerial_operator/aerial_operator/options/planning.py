@@ -19,14 +19,20 @@ from aerial_planner.ocp.options import SolverName
 from aerial_planner.planner import Planner
 
 
-def add_planner_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the choice of planner variant."""
+def add_choice_arguments(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
+    """Add what a request may choose of the planner, and return the group these options are in."""
     planner = parser.add_argument_group("planner")
     planner.add_argument("--variant", metavar="KD|AAKD|AAKD*", default="AAKD*", help="of its dynamics (default: AAKD*)")
     planner.add_argument("--no-warm-start", action="store_true", help="skip the single-rigid-body stage")
     planner.add_argument(
         "--optimize-timing", action="store_true", help="let the optimizer choose how long the take-off's phases last"
     )
+    return planner
+
+
+def add_planner_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what a request may choose of the planner, and what makes a planner of this process: its solver, its plans."""
+    planner = add_choice_arguments(parser)
     planner.add_argument(
         "--library",
         metavar="FOLDER",
@@ -42,7 +48,7 @@ def add_planner_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def planner_choices(args: argparse.Namespace) -> dict[str, Any]:
-    """Return the fields of a request that the planner options set."""
+    """Return the fields of a request that ``add_choice_arguments`` sets."""
     return {
         "variant": args.variant,
         "warm_start": not args.no_warm_start,

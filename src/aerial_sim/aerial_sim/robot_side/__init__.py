@@ -1,1 +1,7 @@
-"""What a robot has between a command and its joints, and between its sensors and a state."""
+"""What a real robot brings along between its computer and the physics: motor boards, their watchdog, and sensors."""
+
+from aerial_sim.robot_side.motor_board import MotorBoards
+from aerial_sim.robot_side.sensors import SensorNoise, Sensors
+from aerial_sim.robot_side.watchdog import Watchdog
+
+__all__ = ["MotorBoards", "SensorNoise", "Sensors", "Watchdog"]

@@ -13,7 +13,7 @@ from aerial_model.values.command import Command
 
 
 class _Law(NamedTuple):
-    """What the drives need of the actuator law, arrays ``(n,)``, and of the battery."""
+    """What the motor boards need of the actuator law, arrays ``(n,)``, and of the battery."""
 
     torque_max: np.ndarray
     bus_voltage: np.ndarray
@@ -27,13 +27,13 @@ class _Period(NamedTuple):
     """The record of one control period."""
 
     requested: np.ndarray  # (n,) sum over the physics steps so far [N·m]
-    delivered: np.ndarray  # (n,) the same [N·m]
+    delivered: np.ndarray  # (n,) sum of what the motors gave [N·m]
     peaks: np.ndarray  # (2,) largest ratios of requested torque and of the voltage it needs
     current: np.ndarray  # (1,) drawn from the battery in the last physics step [A]
 
 
-class Drive:
-    """All drives of a robot, with the record of one control period.
+class MotorBoards:
+    """All motor boards of a robot, with the record of one control period.
 
     Args:
         law: limits of the motors.
@@ -43,13 +43,18 @@ class Drive:
 
     def __init__(self, law: ActuatorLaw, steps: int, battery_resistance: float = 0.0) -> None:
         n = len(law.torque_max)
-        names = ("torque_max", "bus_voltage", "volts_per_torque", "volts_per_speed")
-        amperes_per_torque = 1.0 / (law.torque_constant * law.gear_ratio)
-        arrays = [np.array(getattr(law, name), dtype=float) for name in names]
-        self._law = _Law(*arrays, amperes_per_torque, float(battery_resistance))
+        self._law = _Law(
+            torque_max=np.array(law.torque_max, dtype=float),
+            bus_voltage=np.array(law.bus_voltage, dtype=float),
+            volts_per_torque=np.array(law.volts_per_torque, dtype=float),
+            volts_per_speed=np.array(law.volts_per_speed, dtype=float),
+            amperes_per_torque=1.0 / (law.torque_constant * law.gear_ratio),
+            battery_resistance=float(battery_resistance),
+        )
         self._steps = steps
         self._period = _Period(np.zeros(n), np.zeros(n), np.zeros(2), np.zeros(1))
-        nothing = Command(**dict.fromkeys(("torque", "position", "velocity", "stiffness", "damping"), np.zeros(n)))
+        zero = np.zeros(n)
+        nothing = Command(torque=zero, position=zero, velocity=zero, stiffness=zero, damping=zero)
         self.torque(0, nothing, np.zeros(n), np.zeros(n))  # compiles what no tick may
         self.clear()
 
@@ -100,8 +105,8 @@ class Drive:
 
 @compiled
 def _deliver(
-    step: int, set_points: tuple, position: np.ndarray, speed: np.ndarray, law: _Law, period: _Period
-) -> tuple:
+    step: int, set_points: tuple[np.ndarray, ...], position: np.ndarray, speed: np.ndarray, law: _Law, period: _Period
+) -> tuple[np.ndarray, bool]:
     """Return the torque ``(n,)`` of one physics step, added to the period's record, and whether all of it is finite.
 
     The battery's voltage is down by what the last step's current cost.

@@ -8,6 +8,8 @@ import numpy as np
 from aerial_model.numerics.jit import compiled
 from aerial_sim.world.world import WORLD_BODY, World
 
+TOUCH_DEPTH_MAX = 0.005  # contact is stiff: what reaches deeper than this was not pressed in but put there [m]
+
 
 class ContactSensing:
     """Collects the touches of one control period; only touches of the world count, not of the robot by itself."""
@@ -63,6 +65,16 @@ class ContactSensing:
             mujoco.mj_contactForce(self._world.model, data, k, self._wrench)
             _add_force(forces[self._point_of[point]], frames[k], self._wrench, sign)
         return forces
+
+
+def links_inside_boxes(world: World, data: mujoco.MjData) -> tuple[str, ...]:
+    """Return the links that reach deeper into a box of the terrain than a touch does, in their order."""
+    boxes = set(world.ground_geoms[1:].tolist())
+    model, inside = world.model, set()
+    for pair, distance in zip(data.contact.geom.tolist(), data.contact.dist.tolist(), strict=True):
+        if distance < -TOUCH_DEPTH_MAX and boxes.intersection(pair):
+            inside |= {int(model.geom_bodyid[geom]) for geom in pair} - {WORLD_BODY}
+    return tuple(model.body(body).name for body in sorted(inside))
 
 
 @compiled

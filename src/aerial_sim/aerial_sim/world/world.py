@@ -3,7 +3,7 @@
 What is chosen here, and why:
 
 * The URDF gives bodies, inertias, joints and shapes; ``robot.yaml`` gives armature, damping, dry friction and contact
-  points. Torque limits are not MuJoCo's business: the drive applies the one actuator law before the torque gets here.
+  points. Torque limits are not MuJoCo's business: the motor boards apply the one actuator law before the torque gets here.
 * Contact is as stiff as the step allows (time constant of two steps, impedance 0.95 … 0.99): a standing robot sinks
   in by micrometres. The elliptic friction cone with ``impratio`` 100 keeps a loaded foot from creeping. Joint stops and
   dry friction are equally stiff: MuJoCo's default lets a joint held by dry friction creep at 0.03 rad/s.
@@ -56,7 +56,9 @@ class World:
     contact_geoms: np.ndarray  # (n_c,) id of each contact point's sphere
     trunk: int  # id of the robot's root body
     trunk_name: str
-    ground_geoms: np.ndarray  # ids of floor and boxes
+    trunk_mass: float  # as built, without what is added later [kg]
+    ground_geoms: np.ndarray  # ids of the floor and, after it, of the boxes
+    ground_height: np.ndarray  # height of each of them as built [m]
 
     def qpos(self, q: np.ndarray) -> np.ndarray:
         """Return MuJoCo's qpos ``(nq,)`` of a configuration q ``(nq,)`` in Pinocchio's order."""
@@ -90,15 +92,19 @@ def build(robot: Robot, terrain: Terrain, physics_dt: float) -> World:
         raise ConfigurationError(
             f"{robot.description.path}: MuJoCo cannot use it ({' '.join(str(error).split())})"
         ) from None
+    ground_geoms = np.array([model.geom(name).id for name in ground_names])
+    trunk = model.body(trunk_name).id
     return World(
         model=model,
         terrain=terrain,
         joint_qpos=np.array([model.joint(name).qposadr[0] for name in robot.joint_names]),
         joint_dof=np.array([model.joint(name).dofadr[0] for name in robot.joint_names]),
         contact_geoms=np.array([model.geom(name).id for name in contact_names]),
-        trunk=model.body(trunk_name).id,
+        trunk=trunk,
         trunk_name=trunk_name,
-        ground_geoms=np.array([model.geom(name).id for name in ground_names]),
+        trunk_mass=float(model.body_mass[trunk]),
+        ground_geoms=ground_geoms,
+        ground_height=model.geom_pos[ground_geoms, 2].copy(),
     )
 
 
@@ -112,7 +118,7 @@ def _urdf_with_looks(robot: Robot) -> str:
                 link.remove(shape)  # the contact points stand for it
         for shape in [*link.findall("visual"), *link.findall("collision")]:
             mesh = shape.find("geometry/mesh")
-            if mesh is not None and (shape.tag == "collision" or not _readable(mesh.get("filename"))):
+            if mesh is not None and (shape.tag == "collision" or not _readable(mesh.get("filename", ""))):
                 link.remove(shape)  # collision meshes come back as hulls
         _make_positive(link.find("inertial/inertia"))
     settings = {

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from aerial_model.values.terrain import Terrain
-from aerial_sim.robot_side.motor_board import Drive
+from aerial_sim.robot_side.motor_board import MotorBoards
 from aerial_sim.simulation import Simulation
 
 NO_LOAD_SPEED = {"abad": 40.0, "hip": 40.0, "knee": 25.72}  # [rad/s] 24 V over k_e g_r
@@ -18,8 +18,8 @@ def kind(name):
 
 
 @pytest.fixture
-def drive(robot):
-    return Drive(robot.actuators, 1)
+def boards(robot):
+    return MotorBoards(robot.actuators, 1)
 
 
 @pytest.fixture
@@ -27,21 +27,21 @@ def by_joint(robot):
     return lambda table: np.array([table[kind(name)] for name in robot.joint_names])
 
 
-def test_full_torque_is_delivered_up_to_the_corner_speed(robot, drive, torque_command, by_joint):
+def test_full_torque_is_delivered_up_to_the_corner_speed(robot, boards, torque_command, by_joint):
     speed = by_joint(CORNER_SPEED) - SPEED_TOLERANCE
-    delivered = drive.torque(0, torque_command(100.0), np.zeros(12), speed)
+    delivered = boards.torque(0, torque_command(100.0), np.zeros(12), speed)
     np.testing.assert_allclose(delivered, by_joint(TORQUE_MAX))
 
 
-def test_less_than_full_torque_is_delivered_beyond_it(robot, drive, torque_command, by_joint):
+def test_less_than_full_torque_is_delivered_beyond_it(robot, boards, torque_command, by_joint):
     speed = by_joint(CORNER_SPEED) + SPEED_TOLERANCE
-    delivered = drive.torque(0, torque_command(100.0), np.zeros(12), speed)
+    delivered = boards.torque(0, torque_command(100.0), np.zeros(12), speed)
     assert np.all(delivered < by_joint(TORQUE_MAX))
 
 
-def test_no_torque_is_left_at_the_no_load_speed(robot, drive, torque_command, by_joint):
-    below = drive.torque(0, torque_command(100.0), np.zeros(12), by_joint(NO_LOAD_SPEED) - SPEED_TOLERANCE)
-    beyond = drive.torque(0, torque_command(100.0), np.zeros(12), by_joint(NO_LOAD_SPEED) + SPEED_TOLERANCE)
+def test_no_torque_is_left_at_the_no_load_speed(robot, boards, torque_command, by_joint):
+    below = boards.torque(0, torque_command(100.0), np.zeros(12), by_joint(NO_LOAD_SPEED) - SPEED_TOLERANCE)
+    beyond = boards.torque(0, torque_command(100.0), np.zeros(12), by_joint(NO_LOAD_SPEED) + SPEED_TOLERANCE)
     assert np.all(below > 0)
     assert np.all(beyond < 0)
 
@@ -81,28 +81,28 @@ def test_ratios_are_those_of_the_torque_before_any_limit(robot, torque_command, 
 
 
 def test_the_peak_of_a_period_is_kept_not_its_mean(robot, torque_command):
-    drive = Drive(robot.actuators, 2)
-    drive.torque(0, torque_command(9.0), np.zeros(12), np.zeros(12))
-    drive.torque(1, torque_command(18.0), np.zeros(12), np.zeros(12))
-    assert drive.peak_torque_ratio == pytest.approx(1.0)
-    np.testing.assert_allclose(drive.requested_torque, 13.5)
+    boards = MotorBoards(robot.actuators, 2)
+    boards.torque(0, torque_command(9.0), np.zeros(12), np.zeros(12))
+    boards.torque(1, torque_command(18.0), np.zeros(12), np.zeros(12))
+    assert boards.peak_torque_ratio == pytest.approx(1.0)
+    np.testing.assert_allclose(boards.requested_torque, 13.5)
 
 
-def test_the_voltage_ratio_counts_the_back_emf(robot, drive, torque_command):
+def test_the_voltage_ratio_counts_the_back_emf(robot, boards, torque_command):
     speed = robot.actuators.no_load_speed
-    drive.torque(0, torque_command(0.0), np.zeros(12), speed)
-    assert drive.peak_voltage_ratio == pytest.approx(1.0)
+    boards.torque(0, torque_command(0.0), np.zeros(12), speed)
+    assert boards.peak_voltage_ratio == pytest.approx(1.0)
 
 
-def test_set_points_pull_with_their_gains(robot, drive, hold):
-    delivered = drive.torque(0, hold, robot.poses["home"] - 0.1, np.full(12, 0.5))
+def test_set_points_pull_with_their_gains(robot, boards, hold):
+    delivered = boards.torque(0, hold, robot.poses["home"] - 0.1, np.full(12, 0.5))
     np.testing.assert_allclose(delivered, hold.stiffness * 0.1 - hold.damping * 0.5)
 
 
-def test_clearing_forgets_the_period(robot, drive, torque_command):
-    drive.torque(0, torque_command(5.0), np.zeros(12), np.ones(12))
-    drive.clear()
-    assert drive.peak_torque_ratio == drive.peak_voltage_ratio == 0.0
+def test_clearing_forgets_the_period(robot, boards, torque_command):
+    boards.torque(0, torque_command(5.0), np.zeros(12), np.ones(12))
+    boards.clear()
+    assert boards.peak_torque_ratio == boards.peak_voltage_ratio == 0.0
 
 
 def test_dry_friction_holds_a_joint_against_less_than_itself(robot, torque_command):

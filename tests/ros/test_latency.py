@@ -1,6 +1,6 @@
 import pytest
 
-from aerial_sim.robot_side.round_trip import LONGEST, RESOLUTION, Latency
+from aerial_ros.latency import LONGEST, RESOLUTION, Latency
 
 
 def test_percentiles_are_right_to_the_resolution():
