@@ -228,7 +228,7 @@ def test_a_motion_is_aborted_on_the_ground(standing, hop):
 def test_it_is_too_late_to_abort_in_the_air(standing, hop):
     standing.controller.accept(hop)
     standing.run(hop.take_off_time + 0.05)
-    assert refused(standing.controller.abort).code is RefusalCode.INVALID_REQUEST
+    assert refused(standing.controller.abort).code is RefusalCode.BUSY
 
 
 def test_there_is_nothing_to_abort_while_it_stands(standing):
@@ -263,8 +263,8 @@ def test_an_emergency_stop_latches(standing, hop):
     standing.run(1.0)
     assert standing.controller.phase is Phase.STOPPED
     assert not any(command.torque.any() for command in standing.commands[-100:])
-    assert refused(lambda: standing.controller.accept(hop)).code is RefusalCode.NOT_STANDING
-    assert refused(standing.controller.stand_up).code is RefusalCode.INVALID_REQUEST
+    assert refused(lambda: standing.controller.accept(hop)).code is RefusalCode.STOPPED
+    assert refused(standing.controller.stand_up).code is RefusalCode.STOPPED
     standing.controller.reset()
     standing.run(1.5)
     assert standing.controller.phase is Phase.STAND

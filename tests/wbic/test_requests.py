@@ -73,7 +73,7 @@ def test_a_plan_that_comes_again_while_it_runs_gets_its_answer_again(requests, c
     assert controller.calls == ["accept"]
 
 
-@pytest.mark.parametrize(("phase", "code"), [(Phase.LIE, RefusalCode.FELL), (Phase.STOPPED, RefusalCode.NOT_STANDING)])
+@pytest.mark.parametrize(("phase", "code"), [(Phase.LIE, RefusalCode.FELL), (Phase.STOPPED, RefusalCode.STOPPED)])
 def test_a_motion_that_ends_badly_fails(requests, controller, plan, phase, code):
     requests.execute(plan)
     settle(controller, phase)

@@ -42,6 +42,7 @@ class RefusalCode(StrEnum):
     FELL = "fell"
     TIMEOUT = "timeout"
     INTERNAL = "internal"
+    STOPPED = "stopped"
 
 
 class RefusalError(AerialError):

@@ -1,20 +1,21 @@
 """The whole-body controller: a measurement in, a command out, 500 times a second.
 
-    estimator → phase → target → tasks → hierarchy → qp → drive
+    supervisor → estimator → behaviour's target → tasks → hierarchy → qp → joint command
 
 Without a plan the robot stands. A plan is followed from take-off through flight to its landing time; then the robot
-comes to rest over its feet and stands again, ready for the next.
+comes to rest over its feet and stands again, ready for the next. What else it can do, and what may follow what, says
+``behaviours.supervisor``.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from aerial_model.errors import RefusalCode, RefusalError
 from aerial_model.kinematics import Configuration, Kinematics
-from aerial_model.numerics import rotation
 from aerial_model.robot.posture import crouch_depth
 from aerial_model.robot.robot import BASE_ORIENTATION, BASE_POSITION, GRAVITY, JOINT_POSITION, Robot
 from aerial_model.timing import CONTROL_PERIOD
@@ -24,15 +25,21 @@ from aerial_model.values.frame import StartFrame
 from aerial_model.values.measurement import Measurement
 from aerial_model.values.plan import Plan, Track
 from aerial_wbic.behaviours.acceptance import check_start
-from aerial_wbic.behaviours.phase import FOLLOWING, Phase, Phases
+from aerial_wbic.behaviours.behaviour import Behaviour, Event, Setting
+from aerial_wbic.behaviours.follow_plan import PlanTarget
+from aerial_wbic.behaviours.lie import FoldTarget
+from aerial_wbic.behaviours.phase import FOLLOWING, Phase
+from aerial_wbic.behaviours.supervisor import Supervisor
 from aerial_wbic.estimation.estimator import Estimator
 from aerial_wbic.estimation.touchdown import ContactSense
-from aerial_wbic.force_qp.optimization import ForceOptimization
+from aerial_wbic.force_qp.optimization import ForceOptimization, Solution
 from aerial_wbic.force_qp.solvers import SOLVERS
 from aerial_wbic.gains import ControllerGains, Touchdown
 from aerial_wbic.joint_command import Drive
-from aerial_wbic.target import Fold, Following, PostureTarget, WholeBodyTarget
+from aerial_wbic.stopwatch import Clock, Part, Stopwatch
+from aerial_wbic.target import PostureTarget, WholeBodyTarget, copied_target
 from aerial_wbic.tasks.tasks import Limbs, arrangement_block, attitude_error, command
+from aerial_wbic.trace import TickTrace
 
 _DEPTH_SHARE = 0.85  # of the depth to which legs can bend that a landing may use
 
@@ -53,26 +60,41 @@ class ControllerStatus:
     angular_momentum_error: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) [kg·m²/s]
 
 
+class _Tick(NamedTuple):
+    """What a trace is made from, should someone ask: references to what the next tick overwrites."""
+
+    measurement: Measurement
+    behaviour: Behaviour
+    state: Configuration
+    target: WholeBodyTarget | PostureTarget | None
+    command: Command
+    vdot_cmd: np.ndarray | None = None
+    v_ref: np.ndarray | None = None
+    solution: Solution | None = None
+    saturated: bool = False
+
+
 class Controller:
     """One robot's controller.
 
     Args:
         robot: with a section ``controller`` in its ``robot.yaml``.
+        clock: by which ``trace`` tells how long a tick's parts took; None: it does not.
 
     Raises:
         ConfigurationError: for a missing or misspelt gain.
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, clock: Clock | None = None) -> None:
         self.robot = robot
-        self._gains = _within_reach(robot.section("controller", ControllerGains), robot)
+        self._gains = gains = _within_reach(robot.section("controller", ControllerGains), robot)
         self._limbs = Limbs(robot)
-        self._arrangement = arrangement_block(self._gains)
-        gains = self._gains
+        self._arrangement = arrangement_block(gains)
+        self._stopwatch = Stopwatch(clock)
         self._qp = ForceOptimization(robot, gains.weight_base, gains.weight_force, SOLVERS[gains.qp_solver])
-        self._estimator = Estimator(robot, self._gains.estimator)
+        self._estimator = Estimator(robot, gains.estimator, self._stopwatch)
         self._sense = ContactSense(robot, gains.touchdown_sensing, gains.stiction_speed)
-        self._home_height = _home_height(robot)
+        self._supervisor = Supervisor(Setting(robot=robot, gains=gains, home_height=_home_height(robot)))
         self.reset()
         self._rehearse()
         self.reset()
@@ -81,32 +103,54 @@ class Controller:
         """Forget estimate, plan, stop and counters; stand from the next measurement on."""
         self._estimator.reset()
         self._sense.forget()
-        self._phases = Phases(self.robot, self._gains, self._home_height)
+        self._supervisor.reset()
+        self._touching = np.zeros(self.robot.n_contacts, dtype=bool)  # points felt to bear load in the last flight tick
         self._drive = Drive(self.robot, self._gains)
-        self._now: tuple[Configuration, WholeBodyTarget | PostureTarget | None] | None = (
-            None  # what the last tick saw and wanted
-        )
+        self._last: _Tick | None = None
+        self._start_frame = StartFrame()  # of the plan that was accepted last
         self.estimate: Estimate | None = None  # in the odom frame; None before the first measurement
         self._ticks = self._fallback_ticks = 0
 
     def step(self, measurement: Measurement) -> Command:
         """Return the answer to a measurement."""
+        self._stopwatch.start()
         self._ticks += 1
-        self._phases.tick(measurement.time)
-        self.estimate = self._estimator.update(measurement, self._phases.contacts())
+        self._supervisor.advance(measurement.time, self._touching)
+        self.estimate = self._estimator.update(measurement, self._supervisor.contact)
         state = self._estimator.state
-        self._feel(state, measurement)
-        target = self._phases.target(state)
-        self._now = (state, target)
-        if not isinstance(target, WholeBodyTarget):
-            return self._drive.resting(target, measurement)
+        self._stopwatch.lap(Part.ESTIMATE)
+        self._detect_touchdown(state, measurement)
+        self._supervisor.observe(state)
+        target = self._supervisor.target(state)
+        self._stopwatch.lap(Part.TARGET)
+        if isinstance(target, WholeBodyTarget):
+            return self._balance(measurement, state, target)
+        command = self._drive.resting(target, measurement)
+        self._stopwatch.lap(Part.TORQUE)
+        self._last = _Tick(measurement, self._supervisor.behaviour, state, target, command)
+        return command
+
+    def _balance(self, measurement: Measurement, state: Configuration, target: WholeBodyTarget) -> Command:
+        """Return the command that moves the whole body as the target asks, by forces that the ground can give."""
+        saturated_before = self._drive.saturated_ticks
         vdot_cmd, v_ref = self._accelerations(state, target)
-        wish = state, vdot_cmd, target.force, target.contact
-        solution = self._qp.solve(*wish)
+        self._stopwatch.lap(Part.HIERARCHY)
+        desired = state, vdot_cmd, target.force, target.contact
+        solution = self._qp.solve(*desired)
         self._fallback_ticks += not solution.solved
+        self._stopwatch.lap(Part.QP)
         if np.count_nonzero(target.contact) and self._drive.exceeds(solution.torque, v_ref, measurement):
-            solution = self._qp.within(self._drive.room(v_ref, measurement), solution, *wish)
-        return self._drive.command(solution.torque, v_ref, measurement)
+            room = self._drive.room(v_ref, measurement)
+            self._stopwatch.lap(Part.TORQUE)
+            solution = self._qp.within(room, solution, *desired)
+            self._stopwatch.lap(Part.QP)
+        command = self._drive.command(solution.torque, v_ref, measurement)
+        self._stopwatch.lap(Part.TORQUE)
+        saturated = self._drive.saturated_ticks > saturated_before
+        self._last = _Tick(
+            measurement, self._supervisor.behaviour, state, target, command, vdot_cmd, v_ref, solution, saturated
+        )
+        return command
 
     def accept(self, plan: Plan) -> None:
         """Begin ``plan``, given in the start heading frame, with the next measurement.
@@ -116,13 +160,12 @@ class Controller:
             RefusalError: if a plan runs, the robot does not stand, or it stands elsewhere than the plan begins.
         """
         plan.checked(self.robot)
-        if self._phases.plan is not None:
-            raise RefusalError(RefusalCode.BUSY, f"motion '{self._phases.plan.motion}' still runs")
-        if self.estimate is None or self.phase is not Phase.STAND:
-            raise RefusalError(RefusalCode.NOT_STANDING, f"the robot does not stand; its phase is {self.phase.name}")
+        self._supervisor.check(Event.PLAN_ACCEPTED)
+        if self.estimate is None:
+            raise RefusalError(RefusalCode.NOT_STANDING, "the robot does not stand yet: no measurement has come")
         check_start(plan, self.estimate, self.robot, self._gains)
         self._start_frame = StartFrame.of(self.robot, self.estimate.q)
-        self._phases.follow(plan.placed(self._start_frame))
+        self._supervisor.ask(Event.PLAN_ACCEPTED, plan.placed(self._start_frame))
 
     def abort(self) -> None:
         """Call off the motion that runs and come to rest, as long as every foot is on the ground.
@@ -130,7 +173,7 @@ class Controller:
         Raises:
             RefusalError: if no motion runs or a foot has left the ground.
         """
-        self._phases.abort()
+        self._supervisor.ask(Event.ABORT)
 
     def lie_down(self) -> None:
         """Sink to the ground and let the joints go.
@@ -138,7 +181,7 @@ class Controller:
         Raises:
             RefusalError: if the robot does not stand.
         """
-        self._phases.lie_down()
+        self._supervisor.ask(Event.LIE_DOWN)
 
     def stand_up(self) -> None:
         """Fold the legs under the body and rise.
@@ -146,44 +189,74 @@ class Controller:
         Raises:
             RefusalError: if the robot does not lie, or lies too far on its side.
         """
-        if self.estimate is not None and rotation.tilt(self.estimate.q[BASE_ORIENTATION]) > self._gains.fall_tilt:
-            raise RefusalError(RefusalCode.FELL, "the robot lies on its side or back: set it on its belly first")
-        self._phases.stand_up()
+        self._supervisor.ask(Event.STAND_UP)
 
     def stop(self) -> None:
         """Emergency stop: joints are only damped until ``reset``."""
-        self._phases.stop()
+        self._supervisor.ask(Event.STOP)
 
     @property
     def phase(self) -> Phase:
         """What the controller is doing."""
-        return self._phases.phase
+        return self._supervisor.phase
 
     @property
     def settled(self) -> bool:
         """Whether nothing is under way: the robot stands, lies, or is stopped."""
-        return self._phases.settled
+        return self._supervisor.behaviour.settled
 
     @property
     def status(self) -> ControllerStatus:
         """How the controller is doing, as of the last tick."""
-        plan = self._phases.plan
+        run = self._supervisor.plan_run
         return ControllerStatus(
             phase=self.phase,
-            time_in_plan=self._phases.time_in_plan,
-            request_id="" if plan is None else plan.request_id,
+            time_in_plan=self._supervisor.time_in_plan,
+            request_id="" if run is None else run.plan.request_id,
             ticks=self._ticks,
             saturated_ticks=self._drive.saturated_ticks,
             fallback_ticks=self._fallback_ticks,
-            **(self._errors() if self.phase in FOLLOWING and self._phases.time_in_plan > 0 else {}),
+            **(self._errors() if self.phase in FOLLOWING and self._supervisor.time_in_plan > 0 else {}),
         )
 
-    def _feel(self, state: Configuration, measurement: Measurement) -> None:
+    @property
+    def trace(self) -> TickTrace:
+        """What the last tick saw, wanted and commanded.
+
+        Raises:
+            RuntimeError: before the first tick.
+        """
+        tick, estimate = self._last, self.estimate
+        if tick is None or estimate is None:
+            raise RuntimeError("there is no trace before the first measurement")
+        time, behaviour = tick.measurement.time, tick.behaviour
+        run = behaviour.plan_run
+        return TickTrace(
+            time=time,
+            sequence=tick.measurement.sequence,
+            phase=behaviour.phase(time),
+            behaviour=behaviour.name,
+            time_in_plan=0.0 if run is None else run.time(time),
+            request_id="" if run is None else run.plan.request_id,
+            estimate=estimate,
+            contact=behaviour.contact(time).copy(),
+            target=copied_target(tick.target),
+            vdot_cmd=tick.vdot_cmd,
+            v_ref=tick.v_ref,
+            force=None if tick.solution is None else tick.solution.force.copy(),
+            joint_torque=None if tick.solution is None else tick.solution.torque.copy(),
+            command=tick.command,
+            saturated=tick.saturated,
+            fallback=tick.solution is not None and not tick.solution.solved,
+            durations=dict(self._stopwatch.durations),
+        )
+
+    def _detect_touchdown(self, state: Configuration, measurement: Measurement) -> None:
         """Feel for the ground in flight, if that is to end it."""
         if self._gains.touchdown is Touchdown.TIME:
             return
         if self.phase is Phase.FLIGHT:
-            self._phases.feel(self._sense.update(measurement.time, state, measurement.joint_torque))
+            self._touching = self._sense.update(measurement.time, state, measurement.joint_torque)
         else:
             self._sense.forget()
 
@@ -210,17 +283,18 @@ class Controller:
                 localization=q[BASE_POSITION].copy(),
             )
             self.step(measurement)
-        state, target = self._now
-        wish = state, np.zeros(self.robot.model.nv), target.force, target.contact
-        self._qp.within(self._drive.room(state.v, measurement), self._qp.solve(*wish), *wish)
+        tick = self._last
+        state, target = tick.state, tick.target
+        desired = state, np.zeros(self.robot.model.nv), target.force, target.contact
+        self._qp.within(self._drive.room(state.v, measurement), self._qp.solve(*desired), *desired)
         attitude_error(target.body.orientation, state.base_orientation)
         for time in (0.0, CONTROL_PERIOD):
             self._sense.update(time, state, joints)
-        Fold(state, 0.0, rate=1.0, pose=joints).at(0.0, state)
-        Following(Track.still(self.robot.n_joints, self.robot.n_contacts), self._gains.follow).at(0.0)
+        FoldTarget(state, 0.0, rate=1.0, pose=joints).at(0.0)
+        PlanTarget(Track.still(self.robot.n_joints, self.robot.n_contacts), self._gains.follow).at(0.0)
 
     def _errors(self) -> dict[str, np.ndarray]:
-        state, target = self._now
+        state, target = self._last.state, self._last.target
         R_SW = self._start_frame.R_SW
         return {
             "com_error": R_SW @ (target.body.com - state.com),

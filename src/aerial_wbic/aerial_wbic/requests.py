@@ -90,7 +90,7 @@ class Requests:
         if self._controller.phase is expected:
             return [request.answer(Outcome.LANDED)]
         if self._controller.phase is Phase.STOPPED:
-            return [request.answer(Outcome.FAILED, RefusalError(RefusalCode.NOT_STANDING, "emergency stop"))]
+            return [request.answer(Outcome.FAILED, RefusalError(RefusalCode.STOPPED, "an emergency stop ended it"))]
         reason = RefusalError(
             RefusalCode.FELL, "the robot did not come to stand: it tilted too far or its body lies too low"
         )

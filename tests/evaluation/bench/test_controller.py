@@ -5,9 +5,9 @@ import pytest
 from aerial_evaluation.bench.controller import SECTIONS
 from aerial_evaluation.bench.planner import measured
 from aerial_evaluation.bench.subject import Subject
-from aerial_evaluation.bench.ticks import PARTS
 from aerial_model.robot.robot import Robot
 from aerial_wbic.gains import QpSolver, TaskOrder
+from aerial_wbic.stopwatch import Part
 
 FORCE_TOLERANCE = 2.0  # between forces of two solvers [N]
 
@@ -29,7 +29,7 @@ def test_every_solver_and_every_order_of_tasks_is_timed(rows):
 
 def test_the_parts_make_up_the_tick(rows):
     for row in of(rows, "ticks"):
-        assert set(row["parts_us"]) == set(PARTS)
+        assert set(row["parts_us"]) == set(Part)
         assert 0 < row["tick_us"]["p50"] <= row["tick_us"]["p99"] <= row["tick_us"]["max"]
         assert sum(part["p50"] for part in row["parts_us"].values()) < 2 * row["tick_us"]["p50"]
 

@@ -52,10 +52,14 @@ def test_a_change_of_what_is_built_in_is_noticed(called):
 
 
 def test_sources_are_those_that_are_imported_and_no_others():
-    import aerial_wbic.target  # noqa: F401  # what is asked about is loaded
+    import aerial_wbic.behaviours.rest  # noqa: F401  # what is asked about is loaded
 
-    found = sources("aerial_wbic.target")  # some of what it imports stands on lines of its own
-    assert {"aerial_model.numerics.rotation", "aerial_model.values.plan", "aerial_wbic.behaviours.settling"} <= found
+    found = sources("aerial_wbic.behaviours.rest")  # some of what it imports stands on lines of its own
+    assert {
+        "aerial_model.numerics.rotation",
+        "aerial_model.values.plan",
+        "aerial_wbic.behaviours.rest_trajectory",
+    } <= found
     found = sources("aerial_model.kinematics")
     assert {
         "aerial_model.numerics.layout",

@@ -4,33 +4,42 @@ from __future__ import annotations
 
 import copy
 import time
+from typing import NamedTuple
 
 import numpy as np
 
 from aerial_evaluation.bench import qp_peers
 from aerial_evaluation.bench.samples import Row
 from aerial_evaluation.bench.subject import Subject
-from aerial_evaluation.bench.ticks import record, spread
+from aerial_evaluation.bench.ticks import Recording, record, spread
+from aerial_model.kinematics import Configuration, Kinematics
 from aerial_model.robot.robot import Robot
 from aerial_wbic.controller import Controller
 from aerial_wbic.force_qp.optimization import ForceOptimization, Solution
 from aerial_wbic.force_qp.solvers import SOLVERS
 from aerial_wbic.gains import ControllerGains, QpSolver
+from aerial_wbic.target import WholeBodyTarget
 
 
-class ProblemController(Controller):
-    """A controller that keeps the programs it states: (state, q̈_cmd, f_cmd, contact) of every tick."""
+class Problem(NamedTuple):
+    """What ``ForceOptimization.solve`` is asked in one tick."""
 
-    def __init__(self, robot: Robot) -> None:
-        super().__init__(robot)
-        self.problems: list[tuple] = []
-        solve = self._qp.solve
+    state: Configuration
+    vdot_cmd: np.ndarray  # (nv,)
+    f_cmd: np.ndarray  # (n_c, 3) [N]
+    contact: np.ndarray  # (n_c,) bool
 
-        def kept(*problem: np.ndarray) -> Solution:
-            self.problems.append(copy.deepcopy(problem))  # the next tick overwrites the state
-            return solve(*problem)
 
-        self._qp.solve = kept
+def problems_of(recording: Recording, robot: Robot) -> list[Problem]:
+    """Return the problems of a recording's ticks with contact, states computed anew from the estimates."""
+    controller, kinematics = Controller(robot), Kinematics(robot)
+    problems = []
+    for _ in recording.replay(controller):
+        trace = controller.trace
+        if trace.vdot_cmd is not None and isinstance(trace.target, WholeBodyTarget) and trace.target.contact.any():
+            state = kinematics.at(trace.estimate.q, trace.estimate.v)
+            problems.append(Problem(state, trace.vdot_cmd, trace.target.force, trace.target.contact))
+    return problems
 
 
 def solvers(subject: Subject) -> list[Row]:
@@ -47,10 +56,7 @@ def solvers(subject: Subject) -> list[Row]:
     for motion in subject.motions:
         subject.progress(f"solvers of {motion}: recording")
         recording = record(subject, motion)
-        controller = ProblemController(subject.robot)
-        for _ in recording.replay(controller):
-            pass
-        problems = [problem for problem in controller.problems if problem[-1].any()]
+        problems = problems_of(recording, subject.robot)
         optimizations = {
             solver: ForceOptimization(subject.robot, gains.weight_base, gains.weight_force, factory)
             for solver, factory in factories.items()

@@ -6,25 +6,23 @@ Times are CPU times of the thread: unlike wall times they do not grow with what 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from aerial_evaluation.bench.samples import Row
 from aerial_evaluation.bench.subject import Subject, usual_request
-from aerial_evaluation.closed_loop import STAND_TIME, Loop
+from aerial_evaluation.closed_loop import STAND_TIME
 from aerial_evaluation.judgement.landing import OBSERVE_TIME
 from aerial_model.robot.robot import Robot
-from aerial_model.values.command import Command
 from aerial_model.values.measurement import Measurement
 from aerial_model.values.plan import Plan
 from aerial_sim.simulation import Simulation
 from aerial_wbic.controller import Controller
 from aerial_wbic.gains import ControllerGains, QpSolver, TaskOrder
+from aerial_wbic.stopwatch import Part
 
-PARTS = ("estimate", "kinematics", "target", "hierarchy", "qp", "torque")
 MICRO = 1e6  # microseconds in a second
 
 
@@ -38,7 +36,10 @@ class Recording:
     begin: int  # tick before which the plan was accepted
 
     def replay(self, controller: Controller) -> Iterator[float]:
-        """Let a controller that was reset answer every measurement; yield the time of each answer [s]."""
+        """Let a controller that was reset answer every measurement; yield the time of each answer [s].
+
+        After each of them ``controller.trace`` is that tick's.
+        """
         for k, measurement in enumerate(self.measurements):
             if k == self.begin:
                 controller.accept(self.plan)
@@ -47,71 +48,26 @@ class Recording:
             yield time.thread_time() - began
 
 
-class RecordingController(Controller):
-    """A controller that keeps what it was told."""
-
-    def __init__(self, robot: Robot) -> None:
-        self.measurements: list[Measurement] = []
-        super().__init__(robot)
-        self.measurements.clear()  # those of the rehearsal
-
-    def step(self, measurement: Measurement) -> Command:
-        """Keep the measurement, and answer it."""
-        self.measurements.append(measurement)
-        return super().step(measurement)
-
-
-class TimedController(Controller):
-    """A controller whose parts are timed; ``times`` has each part's sum over a tick [s]."""
-
-    def __init__(self, robot: Robot) -> None:
-        self.times: dict[str, list[float]] = {part: [] for part in PARTS}
-        self._counted = 0.0  # time of all parts so far [s]
-        super().__init__(robot)
-        for times in self.times.values():
-            times.clear()  # those of the rehearsal
-        self._estimator.update = self._timed("estimate", self._estimator.update)
-        self._estimator.kinematics.computed = self._timed("kinematics", self._estimator.kinematics.computed)
-        self._phases.target = self._timed("target", self._phases.target)
-        self._accelerations = self._timed("hierarchy", self._accelerations)
-        self._qp.solve = self._timed("qp", self._qp.solve)
-        self._qp.within = self._timed("qp", self._qp.within)
-        self._drive.exceeds = self._timed("torque", self._drive.exceeds)
-        self._drive.room = self._timed("torque", self._drive.room)
-        self._drive.command = self._timed("torque", self._drive.command)
-
-    def step(self, measurement: Measurement) -> Command:
-        """Answer a measurement, part by part."""
-        for times in self.times.values():
-            times.append(0.0)
-        return super().step(measurement)
-
-    def _timed(self, part: str, call: Callable[..., Any]) -> Callable[..., Any]:
-        def timed(*args: Any) -> Any:
-            within = self._counted
-            began = time.thread_time()
-            result = call(*args)
-            lasted = time.thread_time() - began
-            self.times[part][-1] += lasted - (self._counted - within)  # what parts inside of it took is theirs
-            self._counted = within + lasted
-            return result
-
-        return timed
-
-
 def record(subject: Subject, motion: str) -> Recording:
     """Return a motion as its controller saw it in closed loop.
 
     Raises:
         RefusalError: if planner or controller refuse.
     """
-    loop = Loop(Simulation(subject.robot, seed=subject.seed), RecordingController(subject.robot))
-    loop.advance(STAND_TIME)
-    plan = subject.planner.plan(usual_request(motion, subject.robot), loop.controller.estimate).plan
-    loop.controller.accept(plan)
-    begin = len(loop.controller.measurements)
-    loop.advance(plan.landing_time + OBSERVE_TIME)
-    return Recording(motion=motion, plan=plan, measurements=loop.controller.measurements, begin=begin)
+    simulation, controller = Simulation(subject.robot, seed=subject.seed), Controller(subject.robot)
+    measurements: list[Measurement] = []
+
+    def advance(duration: float) -> None:
+        for _ in range(round(duration / simulation.control_dt)):
+            measurements.append(simulation.measure())
+            simulation.step(controller.step(measurements[-1]))
+
+    advance(STAND_TIME)
+    plan = subject.planner.plan(usual_request(motion, subject.robot), controller.estimate).plan
+    controller.accept(plan)
+    begin = len(measurements)
+    advance(plan.landing_time + OBSERVE_TIME)
+    return Recording(motion=motion, plan=plan, measurements=measurements, begin=begin)
 
 
 def ticks(subject: Subject) -> list[Row]:
@@ -129,19 +85,17 @@ def ticks(subject: Subject) -> list[Row]:
         subject.progress(f"ticks of {motion}: recording")
         recording = record(subject, motion)
         totals: list[list[float]] = [[] for _ in robots]
-        parts = [{part: [] for part in PARTS} for _ in robots]
+        parts: list[dict[Part, list[float]]] = [{part: [] for part in Part} for _ in robots]
         for repeat in range(subject.repeats + 1):
             subject.progress(f"ticks of {motion}: {repeat} of {subject.repeats}")
             for controller, robot, total, part_times in zip(controllers, robots, totals, parts, strict=True):
                 controller.reset()
                 times = list(recording.replay(controller))
-                timed = TimedController(robot)
-                for _ in recording.replay(timed):
-                    pass
+                durations = part_durations(recording, robot)
                 if repeat:
                     total += times
-                    for name, values in timed.times.items():
-                        part_times[name] += values
+                    for part, values in durations.items():
+                        part_times[part] += values
         rows += [
             {
                 "motion": motion,
@@ -149,11 +103,21 @@ def ticks(subject: Subject) -> list[Row]:
                 "qp_solver": str(solver),
                 "ticks": len(recording.measurements),
                 "tick_us": spread(total),
-                "parts_us": {name: spread(values) for name, values in part_times.items()},
+                "parts_us": {str(part): spread(values) for part, values in part_times.items()},
             }
             for (order, solver), total, part_times in zip(choices, totals, parts, strict=True)
         ]
     return rows
+
+
+def part_durations(recording: Recording, robot: Robot) -> dict[Part, list[float]]:
+    """Return how long each part of each of a recording's ticks takes [s], of a controller that is timed."""
+    controller = Controller(robot, clock=time.thread_time)
+    durations: dict[Part, list[float]] = {part: [] for part in Part}
+    for _ in recording.replay(controller):
+        for part, duration in controller.trace.durations.items():
+            durations[part].append(duration)
+    return durations
 
 
 def spread(times: list[float]) -> dict[str, float]:

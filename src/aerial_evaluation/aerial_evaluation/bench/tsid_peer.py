@@ -6,7 +6,6 @@ minutes. TSID and its dependencies are free software (BSD and the like); nothing
 
 from __future__ import annotations
 
-import copy
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +14,13 @@ import numpy as np
 from aerial_evaluation.bench.environment import Environment, Peer
 from aerial_evaluation.bench.samples import Row
 from aerial_evaluation.bench.subject import Subject
-from aerial_evaluation.bench.ticks import Recording, TimedController, record, spread
-from aerial_model.kinematics import Configuration
+from aerial_evaluation.bench.ticks import Recording, part_durations, record, spread
 from aerial_model.robot.robot import Robot
 from aerial_wbic.controller import Controller
 from aerial_wbic.gains import ControllerGains, QpSolver
+from aerial_wbic.stopwatch import Part
 from aerial_wbic.target import WholeBodyTarget
+from aerial_wbic.trace import TickTrace
 
 PEER = Peer(
     "tsid",
@@ -31,21 +31,6 @@ PEER = Peer(
     ),
     ("libtsid==1.10.0", "tsid==1.10.0"),
 )
-
-
-class FollowingController(Controller):
-    """A controller that keeps what every tick saw and wanted."""
-
-    def __init__(self, robot: Robot) -> None:
-        super().__init__(robot)
-        self.followed: list[tuple[Configuration, WholeBodyTarget]] = []
-        accelerations = self._accelerations
-
-        def kept(state: Configuration, target: WholeBodyTarget) -> tuple[np.ndarray, np.ndarray]:
-            self.followed.append(copy.deepcopy((state, target)))  # the next tick overwrites them
-            return accelerations(state, target)
-
-        self._accelerations = kept
 
 
 def tsid(subject: Subject) -> list[Row]:
@@ -71,19 +56,15 @@ def tsid(subject: Subject) -> list[Row]:
 def _row(subject: Subject, recording: Recording, solver: QpSolver, environment: Environment) -> Row:
     robot = subject.robot.with_section("controller", qp_solver=solver)
     whole, after, peers = [], [], []
-    following, controller = FollowingController(robot), Controller(robot)
-    for _ in recording.replay(following):
-        pass
-    followed = np.array([target.contact.all() for _, target in following.followed])
-    asked = problem(robot, [following.followed[k] for k in np.flatnonzero(followed)])
+    controller = Controller(robot)
+    traces = [controller.trace for _ in recording.replay(controller)]
+    followed = np.array([isinstance(each.target, WholeBodyTarget) and each.target.contact.all() for each in traces])
+    asked = problem(robot, [traces[k] for k in np.flatnonzero(followed)])
     for repeat in range(subject.repeats + 1):
         subject.progress(f"tsid: {recording.motion} with {solver}, {repeat} of {subject.repeats}")
         controller.reset()
         ticks = np.array(list(recording.replay(controller)))
-        timed = TimedController(robot)
-        for _ in recording.replay(timed):
-            pass
-        estimating = np.array(timed.times["estimate"])
+        estimating = np.array(part_durations(recording, robot)[Part.ESTIMATE])
         answer = environment.solve(asked)
         if repeat:  # the first warms caches up
             whole += ticks[followed].tolist()
@@ -103,13 +84,13 @@ def _row(subject: Subject, recording: Recording, solver: QpSolver, environment: 
     return row
 
 
-def problem(robot: Robot, followed: list[tuple[Configuration, WholeBodyTarget]]) -> dict[str, Any]:
-    """Return ticks as ``tsid_ticks.py`` reads them: plain JSON types, SI units, W's axes."""
+def problem(robot: Robot, traces: list[TickTrace]) -> dict[str, Any]:
+    """Return ticks with a whole-body target as ``tsid_ticks.py`` reads them: plain JSON types, SI units, W's axes."""
     gains = robot.section("controller", ControllerGains)
-    states, targets = zip(*followed, strict=True)
+    targets = [trace.target for trace in traces if isinstance(trace.target, WholeBodyTarget)]
     rows = {
-        "q": [state.q for state in states],
-        "v": [state.v for state in states],
+        "q": [trace.estimate.q for trace in traces],
+        "v": [trace.estimate.v for trace in traces],
         "com": [np.concatenate(target.body[:3]) for target in targets],  # with velocity and acceleration
         "orientation": [target.body.orientation for target in targets],
         "angular": [

@@ -40,6 +40,7 @@ from aerial_model.robot.robot import (
 from aerial_model.values.estimate import Estimate
 from aerial_model.values.measurement import Measurement
 from aerial_wbic.gains import EstimatorNoise
+from aerial_wbic.stopwatch import Part, Stopwatch
 
 P, V, FEET = 0, 1, 2  # rows of X; the contact points fill it from FEET on
 _INSTANT = 1e-3  # [s] less than a period
@@ -75,9 +76,11 @@ class Estimator:
     Args:
         robot: the robot.
         noise: what is assumed about the sensors.
+        stopwatch: by which the kinematics are timed.
     """
 
-    def __init__(self, robot: Robot, noise: EstimatorNoise) -> None:
+    def __init__(self, robot: Robot, noise: EstimatorNoise, stopwatch: Stopwatch | None = None) -> None:
+        self._stopwatch = stopwatch or Stopwatch()
         self.kinematics = Kinematics(robot)
         self.state: Configuration | None = None  # the robot at the estimate, until the next; None before the first
         self._memory = self.kinematics.blank()  # of state
@@ -114,7 +117,9 @@ class Estimator:
             measurement.joint_velocity,
             self._noise,
         )
+        self._stopwatch.lap(Part.ESTIMATE)
         workspace = self.kinematics.computed(state.q, state.v)
+        self._stopwatch.lap(Part.KINEMATICS)
         if first:
             self._begin(workspace.contacts, measurement.localization)
         self._time, self._gyro = measurement.time, measurement.angular_velocity

@@ -1,4 +1,4 @@
-"""A smooth way from one state of motion to rest.
+"""A smooth trajectory from one state of motion to rest, for any number of coordinates at once.
 
 It is the response of three equal poles from (x_0, ẋ_0, ẍ_0 = 0) to rest at x_f: it brakes early and returns slowly. From
 x_0 = x_f it goes 0.84 ẋ_0 / ω far, brakes with 0.80 ẋ_0 ω at most, and swings back with at most 0.08 ẋ_0 ω.
@@ -10,13 +10,13 @@ import numpy as np
 
 from aerial_model.numerics.jit import compiled
 
-REACH = 0.84  # how far a settling from its end goes, per ẋ_0 / ω
+REACH = 0.84  # how far a trajectory that starts at its end goes, per ẋ_0 / ω
 TIME = 8.0  # after which 99 % of an offset is gone, per 1 / ω
-RATE, C_0, C_1, C_2, END = range(5)  # rows of a way: ω, (c_0 + c_1 u + c_2 u²) exp(−u) with u = ω t, and x_f
+RATE, C_0, C_1, C_2, END = range(5)  # rows of a trajectory: ω, (c_0 + c_1 u + c_2 u²) exp(−u) with u = ω t, and x_f
 
 
-def settling(x_0: np.ndarray, xdot_0: np.ndarray, x_f: np.ndarray, rate: np.ndarray | float) -> np.ndarray:
-    """Return the way ``(5, m)`` from a state of motion to rest.
+def trajectory_to_rest(x_0: np.ndarray, xdot_0: np.ndarray, x_f: np.ndarray, rate: np.ndarray | float) -> np.ndarray:
+    """Return the trajectory ``(5, m)`` from a state of motion to rest.
 
     Args:
         x_0: start ``(m,)``.
@@ -29,17 +29,17 @@ def settling(x_0: np.ndarray, xdot_0: np.ndarray, x_f: np.ndarray, rate: np.ndar
 
 
 @compiled
-def settled(way: np.ndarray, time: float) -> np.ndarray:
-    """Return x, ẋ and ẍ ``(3, m)`` at ``time`` [s] after the start of a way ``(5, m)``."""
-    now = np.empty((3, way.shape[1]))
-    for i in range(way.shape[1]):
-        rate, c_1, c_2 = way[RATE, i], way[C_1, i], way[C_2, i]
+def sampled_trajectory(trajectory: np.ndarray, time: float) -> np.ndarray:
+    """Return x, ẋ and ẍ ``(3, m)`` at ``time`` [s] after the start of a trajectory ``(5, m)``."""
+    now = np.empty((3, trajectory.shape[1]))
+    for i in range(trajectory.shape[1]):
+        rate, c_1, c_2 = trajectory[RATE, i], trajectory[C_1, i], trajectory[C_2, i]
         u = rate * time
         decay = np.exp(-u)
-        x = way[C_0, i] + (c_1 + c_2 * u) * u
+        x = trajectory[C_0, i] + (c_1 + c_2 * u) * u
         slope = c_1 + 2 * c_2 * u - x  # in u, before the decay
         curvature = 2 * c_2 - (c_1 + 2 * c_2 * u) - slope
-        now[0, i] = way[END, i] + x * decay
+        now[0, i] = trajectory[END, i] + x * decay
         now[1, i] = slope * decay * rate
         now[2, i] = curvature * decay * rate * rate
     return now
