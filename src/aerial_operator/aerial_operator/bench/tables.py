@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from aerial_evaluation.bench.ticks import PARTS
 from aerial_operator.console import percent, table
+from aerial_wbic.stopwatch import Part
 
 Row = Mapping[str, Any]
 
@@ -88,7 +88,7 @@ _TABLES = {
             "median": _micros("tick_us", "p50"),
             "99 %": _micros("tick_us", "p99"),
             "largest": _micros("tick_us", "max"),
-            **{part: _micros("parts_us", "p50", part) for part in PARTS},
+            **{part: _micros("parts_us", "p50", part) for part in Part},
         },
     ),
     "solvers": _Table(
