@@ -70,38 +70,6 @@ def test_rows_of_another_size_are_refused(library, kind):
                 values.bind(2, *wrong)
 
 
-def test_every_operation_there_is_c_for_is_computed_as_casadi_does(library):
-    x = ca.SX.sym("x", 2)
-    a, b = ca.vertsplit(x)
-    unary = [ca.sqrt, ca.sin, ca.cos, ca.tan, ca.asin, ca.acos, ca.atan, ca.tanh, ca.exp, ca.log, ca.fabs, lambda v: -v]
-    binary = [
-        a + b,
-        a - b,
-        a * b,
-        a / b,
-        a**b,
-        ca.atan2(a, b),
-        ca.fmin(a, b),
-        ca.fmax(a, b),
-        a**2,
-        2 * a,
-        1 / a,
-        a**1.7,
-    ]
-    f = ca.Function("operations", [x], [ca.vertcat(*(u(a) for u in unary), *binary, np.inf, a)])
-    assert library.compile_function(f)
-    points = np.random.default_rng(1).uniform(0.1, 0.9, size=5 * 2)
-    (ours,) = evaluated(library.load_function(f), 5, [points], [f.nnz_out(0)])
-    theirs = np.hstack([f(point).full().ravel() for point in points.reshape(5, 2)])
-    np.testing.assert_allclose(ours, theirs, rtol=1e-15)
-
-
-def test_an_operation_there_is_no_c_for_is_named(library):
-    x = ca.SX.sym("x")
-    with pytest.raises(CompilationError, match="no C for CasADi's operation"):
-        library.compile_function(ca.Function("floored", [x], [ca.floor(x)]))
-
-
 def test_what_is_compiled_is_not_compiled_again(library, kind):
     library.compile(kind)
     assert not library.compile(kind)

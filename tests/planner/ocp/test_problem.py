@@ -1,13 +1,10 @@
-"""The stage-wise problem against a closed form, against CasADi's own derivatives, and the solvers against each other."""
-
-import dataclasses
+"""Problems against closed forms, and the solvers against each other."""
 
 import casadi as ca
 import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from aerial_planner.ocp.casadi_nlp import FlatProgram
 from aerial_planner.ocp.options import SolverName, SolverOptions
 from aerial_planner.ocp.problem import Problem
 from aerial_planner.ocp.stage import Rows, StageData
@@ -76,30 +73,6 @@ def test_an_impossible_problem_is_not_called_solved(solver):
     assert solution.max_violation > 1.0
 
 
-def test_stage_wise_derivatives_are_those_of_the_whole_problem():
-    """Two kinds with non-linear expressions, states and parameters of different sizes."""
-    x, u, p = ca.SX.sym("x", 2), ca.SX.sym("u"), ca.SX.sym("p")
-    y = ca.SX.sym("y", 3)
-    first, end = Rows(), Rows()
-    first.between("a", ca.sin(x[0]) * u * p, -1.0, 1.0)
-    end.between("b", y[0] * y[1] * y[2], -1.0, 1.0)
-    one = first.stage("one", x, u, p, ca.exp(x[1]) * u**2, ca.vertcat(x[0] * u, ca.cos(x[1]), p * u))
-    two = end.stage("two", y, ca.SX(0, 1), ca.SX(0, 1), ca.sumsqr(y) ** 2, None)
-    functions = FlatProgram([one, two], SolverOptions(solver=SolverName.FATROP)).functions
-
-    w, lam_g, lam_f = ca.MX.sym("w", 6), ca.MX.sym("l", 5), ca.MX.sym("lf")
-    f, g = functions["nlp_f"](w, 0.7), functions["nlp_g"](w, 0.7)
-    H, gradient = ca.hessian(lam_f * f + ca.dot(lam_g, g), w)
-    oracle = ca.Function("oracle", [w, lam_f, lam_g], [ca.jacobian(g, w), gradient, H])
-    rng = np.random.default_rng(0)
-    point, multipliers = rng.normal(size=6), rng.normal(size=5)
-    J_oracle, gradient_oracle, H_oracle = oracle(point, 1.3, multipliers)
-    _, J = functions["nlp_jac_g"](point, 0.7)
-    gradient, H = functions["nlp_hess_l"](point, 0.7, 1.3, multipliers)
-    for ours, theirs in ((J, J_oracle), (gradient, gradient_oracle), (H, H_oracle)):
-        np.testing.assert_allclose(ca.DM(ours).full(), ca.DM(theirs).full(), atol=1e-12)
-
-
 def test_stages_that_do_not_fit_are_refused():
     x, y = ca.SX.sym("x"), ca.SX.sym("y", 2)
     none = ca.SX(0, 1)
@@ -108,24 +81,34 @@ def test_stages_that_do_not_fit_are_refused():
         Problem(kinds, SolverOptions())
 
 
-def test_derivatives_through_a_shorthand_are_those_without():
-    x, u, p, y = ca.SX.sym("x", 2), ca.SX.sym("u"), ca.SX.sym("p"), ca.SX.sym("y", 2)
-    y_is = ca.vertcat(x[0] * u + p, ca.sin(x[1]) * x[0])
-    rows = Rows()
-    rows.between("limit", ca.vertcat(y[0] ** 3 * u, ca.cos(y[1]) * x[1] + y[0]), -1.0, 1.0)
-    short = rows.stage("short", x, u, p, y[0] ** 2 * y[1] + u**2, ca.vertcat(x[1] * u, x[0]), y=y, y_is=y_is)
-    in_full = [ca.substitute(expression, y, y_is) for expression in (short.cost, short.constraints)]
-    nothing = ca.SX(0, 1)
-    long = dataclasses.replace(short, cost=in_full[0], constraints=in_full[1], y=nothing, y_is=nothing)
-    rng = np.random.default_rng(0)
-    functions = [[*kind.batch_functions(), *vars(kind.nlp_functions()).values()] for kind in (short, long)]
-    for ours, theirs in zip(*functions, strict=True):
-        arguments = [rng.normal(size=theirs.size_in(i)) for i in range(theirs.n_in())]
-        for a, b in zip(ours.call(arguments), theirs.call(arguments), strict=True):
-            np.testing.assert_allclose(ca.DM(a).full(), ca.DM(b).full(), atol=1e-12)
+def test_bounds_hold_the_optimum_back_where_the_solution_says_so():
+    x, u = ca.SX.sym("x"), ca.SX.sym("u")
+    first, end = Rows(), Rows()
+    first.between("effort", u, -1.0, 1.0)
+    end.between("goal", x, 0.0, 5.0)
+    none = ca.SX(0, 1)
+    kinds = [
+        first.stage("first", x, u, none, 0.1 * u**2, x + u),
+        end.stage("end", x, none, none, (x - 3.0) ** 2, None),
+    ]
+    zero = np.zeros(1)
+    problem = Problem(kinds, SolverOptions(tolerance=1e-7))
+    data = [StageData.free(p=zero[:0], x=zero, u=zero, x_min=zero, x_max=zero), StageData.free(p=zero[:0], x=zero)]
+    solution = problem.solve(data)
+    assert solution.binding == ("effort",)
+    np.testing.assert_allclose(solution.u[0], [1.0], atol=1e-5)
 
 
-def test_what_a_stage_leads_to_cannot_be_said_in_shorthand():
-    x, u, y = ca.SX.sym("x"), ca.SX.sym("u"), ca.SX.sym("y")
-    with pytest.raises(ValueError, match="next_state must not depend on y"):
-        Rows().stage("stage", x, u, ca.SX(0, 1), u**2, x + y, y=y, y_is=x * u)
+def test_the_violation_of_a_guess_is_its_largest_miss():
+    guess = stages(np.array([1.0, -0.5]))
+    guess[3] = StageData.free(p=np.zeros(0), x=np.array([0.0, 0.7]), u=np.zeros(1))
+    assert double_integrator(SolverName.RICCATI).violation(guess) == pytest.approx(
+        max(np.abs(A @ [1.0, -0.5]).max(), 0.7)
+    )
+
+
+def test_stage_data_that_names_no_bounds_has_none():
+    data = StageData.free(p=np.zeros(0), x=np.zeros(2))
+    assert np.all(data.x_min == -np.inf)
+    assert np.all(data.x_max == np.inf)
+    assert data.u.size == data.u_min.size == data.u_max.size == 0

@@ -59,15 +59,20 @@ class Interpreted:
         name, f = self._function.name(), mapped
         check_sizes(name, arguments, [f.nnz_in(i) for i in range(f.n_in())])
         check_sizes(name, results, [f.nnz_out(i) for i in range(f.n_out())])
-        for rows, bind in ((arguments, buffer.set_arg), (results, buffer.set_res)):
-            for i, row in enumerate(rows):
-                if row.size > 0:
-                    bind(i, row.reshape(-1).data)
+        _bind_rows(arguments, buffer.set_arg)
+        _bind_rows(results, buffer.set_res)
 
         def run(_: object = (mapped, buffer, arguments, results)) -> None:  # CasADi's buffer keeps none of them alive
             evaluate()
 
         return run
+
+
+def _bind_rows(rows: Sequence[np.ndarray], bind: Callable[..., object]) -> None:
+    """Let CasADi read or write rows; it takes no empty ones."""
+    for i, row in enumerate(rows):
+        if row.size > 0:
+            bind(i, row.reshape(-1).data)
 
 
 class Memory(NamedTuple):

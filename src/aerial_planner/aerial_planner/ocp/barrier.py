@@ -1,6 +1,9 @@
-"""Slacks between their bounds: what the barrier −μ Σ ln of their distances contributes to an interior-point iteration.
+"""The logarithmic barrier of bounded slacks, and the multipliers of their bounds.
 
-Each function is one pass over all slacks; numbers in brackets are equations of the paper ``interior_point`` names.
+    φ(s) = −μ Σ_i [ln(s_i − l_i) + ln(u_i − s_i)] ,   z_l (s − l) = z_u (u − s) = μ on the central path
+
+Each function is one pass over all slacks. Numbers in brackets are equations of Wächter and Biegler (2006), whom
+``interior_point`` cites in full.
 """
 
 from __future__ import annotations
@@ -12,11 +15,14 @@ import numpy as np
 from aerial_model.numerics.jit import compiled
 
 _DUAL_RANGE = 1e10  # κ_Σ of (16)
-_PRODUCT_LEAST, _PRODUCT_MOST = 1e-150, 1e150
+_PRODUCT_LEAST, _PRODUCT_MOST = (
+    1e-150,
+    1e150,
+)  # of distances, before its logarithm is taken: the next may not overflow it
 
 
 class Bounds(NamedTuple):
-    """Of m slacks; 0 where there is none."""
+    """Bounds of m slacks; 0 where there is none."""
 
     low: np.ndarray  # (m,)
     high: np.ndarray  # (m,)
@@ -25,27 +31,32 @@ class Bounds(NamedTuple):
 
     @staticmethod
     def of(low: np.ndarray, high: np.ndarray) -> Bounds:
-        """Return bounds given ``(m,)``, infinite where there is none."""
+        """Return the bounds that are given ``(m,)``, infinite where there is none."""
         has_low, has_high = np.isfinite(low), np.isfinite(high)
         return Bounds(np.where(has_low, low, 0.0), np.where(has_high, high, 0.0), has_low, has_high)
 
     @property
-    def count(self) -> int:
-        """How many there are."""
+    def n_finite(self) -> int:
+        """Number of bounds."""
         return int(self.has_low.sum() + self.has_high.sum())
 
-    def pushed(self, s: np.ndarray, push: float) -> np.ndarray:
-        """Return s ``(m,)``, but at some distance from the bounds: ``push`` of their range, or of their size."""
-        room = np.where(self.has_low & self.has_high, push * (self.high - self.low), np.inf)
-        least = self.low + np.minimum(push * np.maximum(1.0, np.abs(self.low)), room)
-        most = self.high - np.minimum(push * np.maximum(1.0, np.abs(self.high)), room)
+    def interior(self, s: np.ndarray, push: float) -> np.ndarray:
+        """Return slacks ``(m,)`` moved to some distance from their bounds (section 3.6).
+
+        Args:
+            s: slacks.
+            push: least distance, as a share of a bound's size (of 1, if smaller) and of the range between two bounds.
+        """
+        distance = np.where(self.has_low & self.has_high, push * (self.high - self.low), np.inf)
+        least = self.low + np.minimum(push * np.maximum(1.0, np.abs(self.low)), distance)
+        most = self.high - np.minimum(push * np.maximum(1.0, np.abs(self.high)), distance)
         s = np.where(self.has_low, np.maximum(s, least), s)
         return np.where(self.has_high, np.minimum(s, most), s)
 
 
 @compiled
 def logarithms(bounds: Bounds, s: np.ndarray) -> float:
-    """Return the sum of the logarithms of all distances; not finite if one is not positive, or next to nothing.
+    """Return the sum of the logarithms of all distances of slacks ``(m,)`` to bounds; NaN if one is not positive.
 
     Distances are multiplied as long as the product is in range, for a logarithm takes ten times as long.
     """
@@ -63,7 +74,7 @@ def logarithms(bounds: Bounds, s: np.ndarray) -> float:
         if not _PRODUCT_LEAST < product < _PRODUCT_MOST:
             total += np.log(product)
             product = 1.0
-    return total + np.log(product)
+    return float(total + np.log(product))
 
 
 @compiled
@@ -76,7 +87,17 @@ def derivatives(
     weight: np.ndarray,
     slope: np.ndarray,
 ) -> None:
-    """Write the barrier's primal-dual curvature Σ and its gradient by each slack ``(m,)``."""
+    """Write the barrier's primal-dual Hessian Σ, which is diagonal, and its gradient by the slacks.
+
+    Args:
+        bounds: of the slacks.
+        s: slacks ``(m,)``.
+        z_low: multipliers of the lower bounds ``(m,)``.
+        z_high: multipliers of the upper bounds ``(m,)``.
+        mu: of the barrier.
+        weight: written, diagonal of Σ ``(m,)``.
+        slope: written, gradient ``(m,)``.
+    """
     for i in range(len(s)):
         weight[i] = slope[i] = 0.0
         if bounds.has_low[i]:
@@ -90,8 +111,8 @@ def derivatives(
 
 
 @compiled
-def products(bounds: Bounds, s: np.ndarray, z_low: np.ndarray, z_high: np.ndarray) -> tuple:
-    """Return the least and the largest product of distance and multiplier; all are μ on the central path."""
+def complementarity(bounds: Bounds, s: np.ndarray, z_low: np.ndarray, z_high: np.ndarray) -> tuple[float, float]:
+    """Return the least and the largest product of a slack's distance to a bound and the bound's multiplier."""
     least, largest = np.inf, -np.inf
     for i in range(len(s)):
         if bounds.has_low[i]:
@@ -105,7 +126,7 @@ def products(bounds: Bounds, s: np.ndarray, z_low: np.ndarray, z_high: np.ndarra
 
 @compiled
 def step_length(bounds: Bounds, s: np.ndarray, ds: np.ndarray, keep: float) -> float:
-    """Return the largest share of a step, at most 1, that uses up no more than ``keep`` of any distance (15a)."""
+    """Return the largest share, at most 1, of a step ds ``(m,)`` that uses up no more than ``keep`` of any distance (15a)."""
     share = 1.0
     for i in range(len(s)):
         if bounds.has_low[i] and ds[i] < 0.0:
@@ -116,7 +137,7 @@ def step_length(bounds: Bounds, s: np.ndarray, ds: np.ndarray, keep: float) -> f
 
 
 @compiled
-def move_multipliers(
+def update_multipliers(
     bounds: Bounds,
     before: np.ndarray,
     after: np.ndarray,
@@ -126,15 +147,15 @@ def move_multipliers(
     mu: float,
     keep: float,
 ) -> None:
-    """Move the bounds' multipliers along their step (14d, 15b), and keep them in range of μ over the distance (16).
+    """Move the bounds' multipliers along their Newton step (14d, 15b), and keep them near μ over the distance (16).
 
     Args:
         bounds: of the slacks.
-        before: the slacks ``(m,)`` at which the step was computed.
-        after: where they are now.
-        ds: their step, all of it.
-        z_low: multipliers, changed.
-        z_high: the same.
+        before: slacks at which the step was computed ``(m,)``.
+        after: slacks that were stepped to ``(m,)``.
+        ds: full step of the slacks ``(m,)``.
+        z_low: multipliers of the lower bounds ``(m,)``, changed.
+        z_high: multipliers of the upper bounds ``(m,)``, changed.
         mu: of the barrier.
         keep: share of a multiplier that a step may use up.
     """
@@ -160,10 +181,19 @@ def move_multipliers(
 
 
 @compiled
-def misses(
+def residuals(
     lagrangian: np.ndarray, nu: np.ndarray, z_low: np.ndarray, z_high: np.ndarray, c: np.ndarray, gap: np.ndarray
-) -> tuple:
-    """Return the largest slope of the Lagrangian by a variable or a slack, and the largest miss of a constraint."""
+) -> tuple[float, float]:
+    """Return the largest entry of the Lagrangian's gradient, and that of the constraints' violation.
+
+    Args:
+        lagrangian: gradient by the variables ``(n_w,)``.
+        nu: multipliers of d − s = 0 ``(m,)``; with z_low and z_high they make the gradient by the slacks.
+        z_low: multipliers of the lower bounds ``(m,)``.
+        z_high: multipliers of the upper bounds ``(m,)``.
+        c: by how much equalities are missed.
+        gap: by how much d − s = 0 is missed ``(m,)``.
+    """
     slope = violation = 0.0
     for i in range(len(lagrangian)):
         slope = _larger(slope, lagrangian[i])
@@ -177,7 +207,7 @@ def misses(
 
 @compiled
 def norm_1(a: np.ndarray) -> float:
-    """Return the sum of the sizes of all entries."""
+    """Return the sum of the absolute values of all entries."""
     size = 0.0
     for i in range(len(a)):
         size += abs(a[i])
@@ -186,5 +216,5 @@ def norm_1(a: np.ndarray) -> float:
 
 @compiled
 def _larger(size: float, a: float) -> float:
-    """Return the larger of two sizes, which is not a number if one is not."""
+    """Return the larger of a size and the absolute value of ``a``; NaN if one of them is."""
     return size if abs(a) <= size or np.isnan(size) else abs(a)

@@ -1,18 +1,19 @@
 """A sequence of stage kinds as one flat nonlinear program for CasADi's interfaces to FATROP and IPOPT.
 
-CasADi's own derivatives of a flat problem take seconds to make. Here those of each kind are mapped over its knots and
+CasADi's own derivatives of a flat problem take seconds to make. Here those of each kind are mapped over its stages and
 scattered into the flat matrices, and handed to ``nlpsol`` through its function cache.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import casadi as ca
 import numpy as np
 
 from aerial_planner.ocp.options import Outcome, SolverName, SolverOptions
+from aerial_planner.ocp.ragged import starts_of
 from aerial_planner.ocp.stage import StageKind
 
 _NLP_GRAD_OUTPUTS = ["f", "g", "grad_gamma_x", "grad_gamma_p"]
@@ -24,8 +25,11 @@ class FlatProgram:
     Variables: x_0, u_0, x_1, u_1, …; constraints: dynamics 0 (x_1 − next_0), constraints 0, dynamics 1, ….
 
     Args:
-        kinds: of each knot.
+        kinds: stage kind of each stage.
         options: of the solver, FATROP or IPOPT.
+
+    Attributes:
+        functions: the program's functions and derivatives, under the names that CasADi's interface looks for.
     """
 
     def __init__(self, kinds: Sequence[StageKind], options: SolverOptions) -> None:
@@ -33,20 +37,26 @@ class FlatProgram:
         self._nx = [kind.x.numel() for kind in kinds]
         self._nu = [kind.u.numel() for kind in kinds]
         self._ng = [kind.constraints.numel() for kind in kinds]
-        n_p = [kind.p.numel() for kind in kinds]
-        n_rows = [kind.n_next + ng for kind, ng in zip(self.kinds, self._ng, strict=True)]
-        n_z = np.add(self._nx, self._nu)
-        self._z_0, self._p_0, self._row_0 = (np.concatenate([[0], np.cumsum(n)]) for n in (n_z, n_p, n_rows))
+        self._z_0 = starts_of(np.add(self._nx, self._nu))
+        self._p_0 = starts_of([kind.p.numel() for kind in kinds])
+        self._row_0 = starts_of([kind.n_next + ng for kind, ng in zip(self.kinds, self._ng, strict=True)])
         rows = [(np.zeros(kind.n_next), kind.lower, kind.upper) for kind in self.kinds]
         self._lower = np.concatenate([np.concatenate([zero, low]) for zero, low, _ in rows])
         self._upper = np.concatenate([np.concatenate([zero, up]) for zero, _, up in rows])
         self._w, self._p = ca.MX.sym("w", int(self._z_0[-1])), ca.MX.sym("p", int(self._p_0[-1]))
         self._name = SolverName(options.solver)
-        self.functions = self._make_functions()  # under the names that CasADi's interface looks for
+        self.functions = self._make_functions()
         self._solver = self._make_solver(options)
 
     def solve(self, w: np.ndarray, p: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> Outcome:
-        """Return where the solver ends from ``w``; arguments as of ``InteriorPoint.solve``."""
+        """Return where the solver ends.
+
+        Args:
+            w: guess ``(n_w,)``.
+            p: parameters of all stages ``(n_p,)``.
+            lower: bounds of w ``(n_w,)``.
+            upper: bounds of w ``(n_w,)``.
+        """
         result = self._solver(x0=w, p=p, lbx=lower, ubx=upper, lbg=self._lower, ubg=self._upper)
         stats = self._solver.stats()
         return Outcome(
@@ -58,7 +68,7 @@ class FlatProgram:
         )
 
     def constraints(self, w: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """Return for each knot the misses of its dynamics, then its constraints, in one row."""
+        """Return for each stage the misses of its dynamics, then its constraints, in one row."""
         return np.asarray(self.functions["nlp_g"](w, p)).ravel()
 
     def _make_solver(self, options: SolverOptions) -> ca.Function:
@@ -86,10 +96,10 @@ class FlatProgram:
             }
         else:
             settings = {"ipopt": {**interior_point, "sb": "yes", "linear_solver": "mumps"}}
-        return ca.nlpsol("kino_dynamic", self._name.value, nlp, {**common, **settings})
+        return ca.nlpsol("flat_program", self._name.value, nlp, {**common, **settings})
 
     def _groups(self) -> list[tuple[StageKind, list[int]]]:
-        """Return each kind with the knots it stands at."""
+        """Return each kind with the stages it stands at."""
         found: dict[int, tuple[StageKind, list[int]]] = {}
         for k, kind in enumerate(self.kinds):
             found.setdefault(id(kind), (kind, []))[1].append(k)
@@ -99,56 +109,65 @@ class FlatProgram:
         w, p = self._w, self._p
         n_w, n_g = w.numel(), len(self._lower)
         lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", n_g)
-        cost = ca.MX(0)
-        g, gradient, jacobian, lagrangian_gradient, hessian = ([] for _ in range(5))  # lists of _Blocks
-        for kind, knots in self._groups():
-            n, stage = len(knots), kind.nlp_functions()
-            z_0, row_0 = self._z_0[knots], self._row_0[knots]
-            row_g = row_0 + kind.n_next
-            z, parameters = _gather(w, z_0, kind.z.numel()), _gather(p, self._p_0[knots], kind.p.numel())
-            lam = (_gather(lam_g, row_0, kind.n_next), _gather(lam_g, row_g, kind.constraints.numel()))
-            f, following, values = stage.values.map(n)(z, parameters)
-            J_x, J_g = stage.jacobian.map(n)(z, parameters)
-            lag, H = stage.hessian.map(n)(z, parameters, ca.repmat(lam_f, 1, n), *lam)
-            column = np.zeros(n, dtype=int)
-            cost += ca.sum2(f)
-            g += [_Blocks(stage.values.sparsity_out(1), -following, row_0, column)]
-            g += [_Blocks(stage.values.sparsity_out(2), values, row_g, column)]
-            gradient += [_Blocks(stage.gradient.sparsity_out(0), stage.gradient.map(n)(z, parameters), z_0, column)]
-            jacobian += [_Blocks(stage.jacobian.sparsity_out(0), J_x, row_0, z_0)]
-            jacobian += [_Blocks(stage.jacobian.sparsity_out(1), J_g, row_g, z_0)]
-            lagrangian_gradient += [_Blocks(stage.hessian.sparsity_out(0), lag, z_0, column)]
-            hessian += [_Blocks(stage.hessian.sparsity_out(1), H, z_0, z_0)]
-        for k, kind in enumerate(self.kinds[:-1]):  # the next knot's state, with coefficient 1
-            x_next = w[int(self._z_0[k + 1]) : int(self._z_0[k + 1]) + kind.n_next]
-            at_row, at_column = self._row_0[k : k + 1], self._z_0[k + 1 : k + 2]
-            g += [_Blocks(ca.Sparsity.dense(kind.n_next, 1), x_next, at_row, np.zeros(1, dtype=int))]
-            jacobian += [_Blocks(ca.Sparsity.diag(kind.n_next), ca.MX.eye(kind.n_next), at_row, at_column)]
-            lam_x = lam_g[int(self._row_0[k]) : int(self._row_0[k]) + kind.n_next]
-            to_rows = self._z_0[k + 1 : k + 2]
-            lagrangian_gradient += [_Blocks(ca.Sparsity.dense(kind.n_next, 1), lam_x, to_rows, np.zeros(1, dtype=int))]
-        g_all = _assembled(g, n_g, 1)
-        grad_f, H_all = _assembled(gradient, n_w, 1), _assembled(hessian, n_w, n_w)
+        parts = _Parts()
+        for kind, stages in self._groups():
+            self._add_kind(parts, kind, stages, lam_f, lam_g)
+        for k in range(len(self.kinds) - 1):
+            self._add_next_state(parts, k, lam_g)
+        cost, g = parts.cost, _assembled(parts.g, n_g, 1)
+        gradient, H = _assembled(parts.gradient, n_w, 1), _assembled(parts.hessian, n_w, n_w)
+        lagrangian, multipliers = _assembled(parts.lagrangian, n_w, 1), [w, p, lam_f, lam_g]
         outputs = {
             "nlp_f": ([w, p], [cost], ["f"]),
-            "nlp_g": ([w, p], [g_all], ["g"]),
-            "nlp_jac_g": ([w, p], [g_all, _assembled(jacobian, n_g, n_w)], ["g", "jac_g_x"]),
+            "nlp_g": ([w, p], [g], ["g"]),
+            "nlp_jac_g": ([w, p], [g, _assembled(parts.jacobian, n_g, n_w)], ["g", "jac_g_x"]),
+            # CasADi looks for this one for the sake of parameters' multipliers, which are not asked for (calc_lam_p).
+            "nlp_grad": (multipliers, [cost, g, lagrangian, ca.MX(p.numel(), 1)], _NLP_GRAD_OUTPUTS),
         }
-        multipliers = [w, p, lam_f, lam_g]
-        grad_lagrangian = _assembled(lagrangian_gradient, n_w, 1)
-        # CasADi wants this one at hand for multipliers of parameters; they are not asked for (calc_lam_p).
-        outputs["nlp_grad"] = (multipliers, [cost, g_all, grad_lagrangian, ca.MX(p.numel(), 1)], _NLP_GRAD_OUTPUTS)
         if self._name is SolverName.FATROP:
-            outputs["nlp_grad_f"] = ([w, p], [grad_f], ["grad_f_x"])
-            outputs["nlp_hess_l"] = (multipliers, [grad_lagrangian, H_all], ["grad_gamma_x", "hess_gamma_x_x"])
+            outputs["nlp_grad_f"] = ([w, p], [gradient], ["grad_f_x"])
+            outputs["nlp_hess_l"] = (multipliers, [lagrangian, H], ["grad_gamma_x", "hess_gamma_x_x"])
         else:
-            outputs["nlp_grad_f"] = ([w, p], [cost, grad_f], ["f", "grad_f_x"])
-            outputs["nlp_hess_l"] = (multipliers, [ca.triu(H_all)], ["triu_hess_gamma_x_x"])
+            outputs["nlp_grad_f"] = ([w, p], [cost, gradient], ["f", "grad_f_x"])
+            outputs["nlp_hess_l"] = (multipliers, [ca.triu(H)], ["triu_hess_gamma_x_x"])
         inputs = ["x", "p", "lam_f", "lam_g"]
         return {
             name: ca.Function(name, arguments, results, inputs[: len(arguments)], result_names)
             for name, (arguments, results, result_names) in outputs.items()
         }
+
+    def _add_kind(self, parts: _Parts, kind: StageKind, stages: list[int], lam_f: ca.MX, lam_g: ca.MX) -> None:
+        """Add the functions of a kind, mapped over its stages."""
+        n, functions = len(stages), kind.nlp_functions()
+        z_0, row_0 = self._z_0[stages], self._row_0[stages]
+        row_g, column = row_0 + kind.n_next, np.zeros(n, dtype=int)
+        z, p = _gather(self._w, z_0, kind.z.numel()), _gather(self._p, self._p_0[stages], kind.p.numel())
+        lam = (_gather(lam_g, row_0, kind.n_next), _gather(lam_g, row_g, kind.constraints.numel()))
+        f, following, values = functions.values.map(n)(z, p)
+        J_x, J_g = functions.jacobian.map(n)(z, p)
+        lagrangian, H = functions.hessian.map(n)(z, p, ca.repmat(lam_f, 1, n), *lam)
+        parts.cost += ca.sum2(f)
+        parts.g += [
+            _Blocks(functions.values.sparsity_out(1), -following, row_0, column),
+            _Blocks(functions.values.sparsity_out(2), values, row_g, column),
+        ]
+        parts.gradient += [_Blocks(functions.gradient.sparsity_out(0), functions.gradient.map(n)(z, p), z_0, column)]
+        parts.jacobian += [
+            _Blocks(functions.jacobian.sparsity_out(0), J_x, row_0, z_0),
+            _Blocks(functions.jacobian.sparsity_out(1), J_g, row_g, z_0),
+        ]
+        parts.lagrangian += [_Blocks(functions.hessian.sparsity_out(0), lagrangian, z_0, column)]
+        parts.hessian += [_Blocks(functions.hessian.sparsity_out(1), H, z_0, z_0)]
+
+    def _add_next_state(self, parts: _Parts, k: int, lam_g: ca.MX) -> None:
+        """Add what the state after stage ``k`` contributes to the stage's dynamics: x_next, with coefficient 1."""
+        n, at_row, at_column = self.kinds[k].n_next, self._row_0[k : k + 1], self._z_0[k + 1 : k + 2]
+        x_next = self._w[int(at_column[0]) : int(at_column[0]) + n]
+        lam_x = lam_g[int(at_row[0]) : int(at_row[0]) + n]
+        dense, zero = ca.Sparsity.dense(n, 1), np.zeros(1, dtype=int)
+        parts.g += [_Blocks(dense, x_next, at_row, zero)]
+        parts.jacobian += [_Blocks(ca.Sparsity.diag(n), ca.MX.eye(n), at_row, at_column)]
+        parts.lagrangian += [_Blocks(dense, lam_x, at_column, zero)]
 
 
 @dataclass(frozen=True)
@@ -161,6 +180,18 @@ class _Blocks:
     column_0: np.ndarray
 
 
+@dataclass
+class _Parts:
+    """Of what the flat program's vectors and matrices are assembled."""
+
+    cost: ca.MX = field(default_factory=lambda: ca.MX(0))
+    g: list[_Blocks] = field(default_factory=list)
+    gradient: list[_Blocks] = field(default_factory=list)
+    jacobian: list[_Blocks] = field(default_factory=list)
+    lagrangian: list[_Blocks] = field(default_factory=list)  # its gradient
+    hessian: list[_Blocks] = field(default_factory=list)
+
+
 def _gather(vector: ca.MX, starts: np.ndarray, n: int) -> ca.MX:
     """Return ``(n, len(starts))``: the n entries from each start, as columns."""
     if n == 0:
@@ -171,18 +202,13 @@ def _gather(vector: ca.MX, starts: np.ndarray, n: int) -> ca.MX:
 
 def _assembled(blocks: Sequence[_Blocks], n_rows: int, n_columns: int) -> ca.MX:
     """Return the sparse matrix that holds all blocks; entries that several blocks share are added."""
-    rows, columns, values = [], [], []
-    for block in blocks:
-        if block.sparsity.nnz() == 0:
-            continue
-        rows.append((block.row_0[:, None] + np.array(block.sparsity.row(), dtype=int)).ravel())
-        columns.append((block.column_0[:, None] + np.array(block.sparsity.get_col(), dtype=int)).ravel())
-        side_by_side = ca.repmat(block.sparsity, 1, len(block.row_0))
-        values.append(ca.vec(ca.project(block.values, side_by_side)).nz[:])
-    if not values:
+    filled = [block for block in blocks if block.sparsity.nnz() > 0]
+    if not filled:
         return ca.MX(n_rows, n_columns)
-    rows, columns = np.concatenate(rows), np.concatenate(columns)
-    nonzeros = ca.vertcat(*values)
+    rows = np.concatenate([_all_of(block.row_0, block.sparsity.row()) for block in filled])
+    columns = np.concatenate([_all_of(block.column_0, block.sparsity.get_col()) for block in filled])
+    values = [ca.project(block.values, ca.repmat(block.sparsity, 1, len(block.row_0))) for block in filled]
+    nonzeros = ca.vertcat(*(ca.vec(value).nz[:] for value in values))
     order = np.lexsort((rows, columns))
     keys = columns[order] * n_rows + rows[order]
     first = np.concatenate([[True], keys[1:] != keys[:-1]])
@@ -191,3 +217,9 @@ def _assembled(blocks: Sequence[_Blocks], n_rows: int, n_columns: int) -> ca.MX:
         return ca.MX(sparsity, nonzeros[order.tolist()])
     gather = ca.Sparsity.triplet(int(first.sum()), len(order), (np.cumsum(first) - 1).tolist(), order.tolist())
     return ca.MX(sparsity, ca.mtimes(ca.DM(gather, 1), nonzeros))
+
+
+def _all_of(corners: np.ndarray, places: Sequence[int]) -> np.ndarray:
+    """Return the rows, or columns, of all entries of blocks whose corners these are, block by block."""
+    entries: np.ndarray = corners[:, None] + np.array(places, dtype=int)
+    return entries.ravel()

@@ -1,19 +1,18 @@
-"""Interior-point method for multi-stage problems, its Newton steps by the constrained Riccati recursion.
+"""Primal-dual interior-point method for multi-stage problems, its Newton steps by the constrained Riccati recursion.
 
     min  f(w)   s.t.  c(w) = 0 ,   d(w) = s ,   l ≤ s ≤ u
 
 c: dynamics and equalities, d: inequalities and bounded variables, each with a slack. The barrier −μ Σ ln of the slacks'
 distances to their bounds takes the place of l and u; μ falls in steps. Each Newton step is a linear-quadratic problem
-(``riccati``); how far to go along it is decided by a filter, and where a direction without curvature is free, a multiple
-of the identity is added to the Hessian. This is IPOPT's method with its constants, without the restoration phase:
-Wächter, Biegler, *On the implementation of an interior-point filter line-search algorithm for large-scale nonlinear
-programming*, Mathematical Programming 106 (2006), whose equations the numbers below are.
+(``newton``, ``riccati``); how far to go along it is decided by a ``filter``, and where a direction without curvature is free, a
+multiple of the identity is added to the Hessian (``regularization``). This is IPOPT's method with its constants, without
+the restoration phase: Wächter and Biegler, *On the implementation of an interior-point filter line-search algorithm for
+large-scale nonlinear programming*, Mathematical Programming 106 (2006), whose equations the numbers below are.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from functools import cache
 from typing import NamedTuple
 
@@ -22,24 +21,20 @@ import numpy as np
 
 from aerial_planner.ocp import barrier
 from aerial_planner.ocp.barrier import Bounds
-from aerial_planner.ocp.newton import StageSequence
+from aerial_planner.ocp.filter import Filter, Merit
+from aerial_planner.ocp.newton import NewtonSystem, Terms
 from aerial_planner.ocp.options import Outcome, SolverOptions
-from aerial_planner.ocp.riccati import LinearQuadratic
+from aerial_planner.ocp.regularization import Regularization
+from aerial_planner.ocp.sequence import StageSequence
 from aerial_planner.ocp.stage import Rows, StageEvaluation, StageKind
 
 _SLOWER, _FASTER = 0.2, 1.5  # κ_μ, θ_μ of (7)
 _SCALE_MAX = 100.0  # s_max of (6)
 _TO_BOUND = 0.99  # τ_min of (8)
-_THETA_MARGIN, _PHI_MARGIN = 1e-5, 1e-8  # γ_θ, γ_φ of (18)
-_ARMIJO, _SWITCH_THETA, _SWITCH_PHI = 1e-8, 1.1, 2.3  # η_φ, s_θ, s_φ of (19), (20)
-_THETA_LEAST, _THETA_MOST = 1e-4, 1e4  # of the first violation: below, descent decides; above, nothing is accepted
 _CORRECTIONS, _CORRECTION_GAIN = 4, 0.99  # p_max, κ_soc of the second-order correction
-_SHORTEST = 1e-7  # step length that counts as none
-_CURVATURE_FIRST, _CURVATURE_LEAST, _CURVATURE_MOST = 1e-4, 1e-20, 1e10  # δ_w of algorithm IC
-_CURVATURE_UP_FIRST, _CURVATURE_UP, _CURVATURE_DOWN = 100.0, 8.0, 1 / 3
-_CURVATURE_TRIED = 1e6  # of which a step that the filter does not accept is tried again with more
-_VIOLATION = 0.1  # of the tolerance is what constraints may be missed by: steps near the optimum are worth it
-_ROUNDING = 10 * np.finfo(float).eps  # what comparisons of large sums must forgive, as a share
+_SHORTEST = 1e-7  # share of the longest step that counts as none
+_VIOLATION = 0.1  # share of the tolerance by which constraints may be missed: steps near the optimum are worth it
+_BARRIER_LEAST = 0.1  # of the tolerance: μ of the last barrier problem
 
 
 class InteriorPoint:
@@ -48,8 +43,8 @@ class InteriorPoint:
     Requests share its memory: they come one after the other.
 
     Args:
-        kinds: of each knot.
-        evaluation_of: the functions of a kind.
+        kinds: stage kind of each stage.
+        evaluation_of: returns the functions of a stage kind.
         options: of the method.
     """
 
@@ -61,39 +56,34 @@ class InteriorPoint:
     ) -> None:
         self._options = options
         self._stages = StageSequence(kinds, evaluation_of)
-        self._newton: dict[bytes, LinearQuadratic] = {}  # by the number of equalities of each knot
+        self._newton: dict[bytes, NewtonSystem] = {}  # by which variables are fixed
 
     def solve(self, w: np.ndarray, p: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> Outcome:
         """Return where the iteration from ``w`` ends.
 
         Args:
             w: guess ``(n_w,)``.
-            p: parameters of all knots.
+            p: parameters of all stages ``(n_p,)``.
             lower: bounds of w ``(n_w,)``, equal to the upper ones where a variable is fixed.
-            upper: bounds of w.
+            upper: bounds of w ``(n_w,)``.
         """
-        stages = self._stages
-        stages.p[:] = p
-        fixed = np.flatnonzero(lower == upper)
-        at_knot = np.searchsorted(stages.z_0, fixed, side="right") - 1
-        n_equal = stages.n_equal + np.bincount(at_knot, minlength=len(stages.nx))
-        key = n_equal.tobytes()
+        self._stages.p.values[:] = p
+        fixed = lower == upper
+        key = fixed.tobytes()
         if key not in self._newton:
-            self._newton[key] = LinearQuadratic(stages.nx, stages.nu, n_equal, stages.links)
-        newton = self._newton[key]
-        newton.C[:] = 0.0  # where other variables may have been fixed
-        return _Iteration(self._options, stages, newton, w, lower, upper).run()
+            self._newton[key] = NewtonSystem(self._stages, np.flatnonzero(fixed))
+        return _Iteration(self._options, self._stages, self._newton[key], w, (lower, upper)).run()
 
     def constraints(self, w: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """Return for each knot the misses of its dynamics, then its constraints, in one row."""
-        self._stages.p[:] = p
+        """Return for each stage the misses of its dynamics, then its constraints, in one row."""
+        self._stages.p.values[:] = p
         self._stages.evaluate(w)
         return self._stages.constraints()
 
 
 @cache
 def rehearse() -> None:
-    """Solve a problem of two knots, so that whatever Numba compiles is compiled, or read from its cache, before a plan."""
+    """Solve a problem of two stages, so that whatever Numba compiles is compiled, or read from its cache, before a plan."""
     x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
     first, end = Rows(), Rows()
     first.equal("start", x[0] - 1.0)
@@ -107,17 +97,29 @@ def rehearse() -> None:
     InteriorPoint(kinds, StageKind.interpreted, SolverOptions()).solve(np.zeros(5), np.zeros(0), *bounds)
 
 
-@dataclass
-class _Point:
+class _Point(NamedTuple):
     """Where the iteration is, and what the functions are there."""
 
-    w: np.ndarray
-    s: np.ndarray
+    w: np.ndarray  # (n_w,)
+    s: np.ndarray  # (m,) slacks
     cost: float
-    c: np.ndarray  # of the equalities
-    gap: np.ndarray  # d − s
+    c: np.ndarray  # misses of dynamics, equalities and fixed variables
+    gap: np.ndarray  # (m,) d − s
     theta: float  # violation
     logarithms: float  # of the slacks' distances to their bounds, summed
+
+    def merit(self, mu: float) -> Merit:
+        """Return violation, and cost with barrier."""
+        return Merit(self.theta, self.cost - mu * self.logarithms)
+
+
+class _Direction(NamedTuple):
+    """A Newton step, and the multipliers after it."""
+
+    dw: np.ndarray  # (n_w,)
+    ds: np.ndarray  # (m,)
+    lam: np.ndarray  # of c
+    nu: np.ndarray  # (m,) of d − s
 
 
 class _Errors(NamedTuple):
@@ -134,47 +136,54 @@ class _Errors(NamedTuple):
         return max(self.slope, self.violation, self.most - mu * self.per_mu, mu * self.per_mu - self.least)
 
 
-@dataclass
 class _Iteration:
-    """The iteration of one solve."""
+    """The iteration of one solve.
 
-    options: SolverOptions
-    stages: StageSequence
-    newton: LinearQuadratic
-    w: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-    curvature: float = 0.0  # δ_w that was last needed
-    added: float = 0.0  # δ_w of the present step
-    filter: list[tuple[float, float]] = field(default_factory=list)
+    Args:
+        options: of the method.
+        stages: of the problem, whose parameters are written.
+        newton: system of the problem with the fixed variables of these limits.
+        w: guess ``(n_w,)``.
+        limits: lower and upper bounds of w ``(n_w,)``.
+    """
 
-    def __post_init__(self) -> None:
-        stages = self.stages
-        bounded = (self.lower < self.upper) & (np.isfinite(self.lower) | np.isfinite(self.upper))
-        self.bounded = np.flatnonzero(bounded)
-        self.fixed = np.flatnonzero(self.lower == self.upper)
-        low = np.concatenate([stages.lower, self.lower[self.bounded]])
-        high = np.concatenate([stages.upper, self.upper[self.bounded]])
-        self.bounds = Bounds.of(low, high)
-        self.n_bounds = self.bounds.count
-        self.unequal = np.flatnonzero(~stages.equality)
-        self.equal = np.flatnonzero(stages.equality)
-        self.mu = self.options.initial_barrier
-        w = np.where(self.lower == self.upper, self.lower, self.w)
+    def __init__(
+        self,
+        options: SolverOptions,
+        stages: StageSequence,
+        newton: NewtonSystem,
+        w: np.ndarray,
+        limits: tuple[np.ndarray, np.ndarray],
+    ) -> None:
+        self.options, self.stages, self.newton = options, stages, newton
+        lower, upper = limits
+        self.bounded = np.flatnonzero((lower < upper) & (np.isfinite(lower) | np.isfinite(upper)))
+        self.fixed = np.flatnonzero(lower == upper)
+        self.fixed_at = lower[self.fixed]
+        self.bounds = Bounds.of(
+            np.concatenate([stages.lower, lower[self.bounded]]), np.concatenate([stages.upper, upper[self.bounded]])
+        )
+        self.n_bounds = self.bounds.n_finite
+        self.unequal, self.equal = np.flatnonzero(~stages.equality), np.flatnonzero(stages.equality)
+        self.mu = options.initial_barrier
+        w = np.where(lower == upper, lower, w)
         stages.evaluate(w)
-        s = self.bounds.pushed(self._inequalities(w), self.options.bound_distance)
+        s = self.bounds.interior(self._inequalities(w), options.bound_distance)
         self.z_low, self.z_high = self.bounds.has_low.astype(float), self.bounds.has_high.astype(float)
         self.weight, self.slope = np.empty_like(s), np.empty_like(s)  # Σ of the barrier and its gradient, at the point
-        self.lam, self.nu = np.zeros(len(stages.miss) + len(self.equal) + len(self.fixed)), self.z_high - self.z_low
+        self.lam = np.zeros(len(stages.miss.values) + len(self.equal) + len(self.fixed))
+        self.nu = self.z_high - self.z_low
         self.point = self._at(w, s)
-        self._limits = (max(1.0, self.point.theta) * _THETA_LEAST, max(1.0, self.point.theta) * _THETA_MOST)
+        self.filter = Filter(self.point.theta)
+        self.regularization = Regularization()
+        self.delta = 0.0  # δ_w of the present step
 
     def run(self) -> Outcome:
         """Iterate until an optimum, the last iteration or a step that leads nowhere."""
         options, status = self.options, "iterations exceeded"
         for iteration in range(options.max_iterations + 1):
             self._differentiate()
-            if not np.isfinite(self._phi(self.point)):
+            if not np.isfinite(self.point.merit(self.mu).phi):
                 status = "not finite"
                 break
             errors = self._errors()
@@ -188,56 +197,49 @@ class _Iteration:
                 status = "no step"
                 break
         return Outcome(
-            w=self.point.w,
-            cost=self.point.cost,
-            iterations=iteration,
-            status=status,
-            converged=status == "solved",
+            w=self.point.w, cost=self.point.cost, iterations=iteration, status=status, converged=status == "solved"
         )
 
     # --- where we are -----------------------------------------------------------------------------------------------
 
     def _inequalities(self, w: np.ndarray) -> np.ndarray:
-        return np.concatenate([self.stages.g[self.unequal], w[self.bounded]])
+        return np.concatenate([self.stages.g.values[self.unequal], w[self.bounded]])
 
     def _at(self, w: np.ndarray, s: np.ndarray) -> _Point:
-        cost = self.stages.evaluate(w)
-        c = np.concatenate([self.stages.miss, self.stages.equality_miss(), w[self.fixed] - self.lower[self.fixed]])
+        stages, cost = self.stages, self.stages.evaluate(w)
+        c = np.concatenate([stages.miss.values, stages.equality_miss(), w[self.fixed] - self.fixed_at])
         gap = self._inequalities(w) - s
         theta = barrier.norm_1(c) + barrier.norm_1(gap)
         return _Point(w=w, s=s, cost=cost, c=c, gap=gap, theta=theta, logarithms=barrier.logarithms(self.bounds, s))
 
-    def _phi(self, point: _Point) -> float:
-        """Return cost and barrier."""
-        return point.cost - self.mu * point.logarithms
-
     def _differentiate(self) -> None:
         """Evaluate all derivatives at the point (at which the functions were evaluated last)."""
         stages, n_rows = self.stages, len(self.unequal)
-        n_x, n_e = len(stages.miss), len(self.equal)
-        stages.lam_x[:] = self.lam[:n_x]
-        stages.lam_g[self.equal] = self.lam[n_x : n_x + n_e]
-        stages.lam_g[self.unequal] = self.nu[:n_rows]
+        n_x, n_e = len(stages.miss.values), len(self.equal)
+        stages.lam_x.values[:] = self.lam[:n_x]
+        stages.lam_g.values[self.equal] = self.lam[n_x : n_x + n_e]
+        stages.lam_g.values[self.unequal] = self.nu[:n_rows]
         stages.differentiate()
-        stages.lagrangian[self.bounded] += self.nu[n_rows:]
-        stages.lagrangian[self.fixed] += self.lam[n_x + n_e :]
+        stages.lagrangian.values[self.bounded] += self.nu[n_rows:]
+        stages.lagrangian.values[self.fixed] += self.lam[n_x + n_e :]
 
     def _errors(self) -> _Errors:
-        """Return how far the point is from an optimum."""
+        """Return how far the point is from an optimum (5)."""
         z_low, z_high, point, n_z = self.z_low, self.z_high, self.point, self.n_bounds
         duals = barrier.norm_1(z_low) + barrier.norm_1(z_high)
         s_d = max(_SCALE_MAX, (barrier.norm_1(self.lam) + duals) / max(1, len(self.lam) + n_z)) / _SCALE_MAX
         s_c = max(_SCALE_MAX, duals / max(1, n_z)) / _SCALE_MAX
-        slope, violation = barrier.misses(self.stages.lagrangian, self.nu, z_low, z_high, point.c, point.gap)
-        least, most = barrier.products(self.bounds, point.s, z_low, z_high)
+        lagrangian = self.stages.lagrangian.values
+        slope, violation = barrier.residuals(lagrangian, self.nu, z_low, z_high, point.c, point.gap)
+        least, most = barrier.complementarity(self.bounds, point.s, z_low, z_high)
         return _Errors(slope=slope / s_d, violation=violation, least=least / s_c, most=most / s_c, per_mu=1.0 / s_c)
 
     def _lower_barrier(self, errors: _Errors) -> None:
         """Go on to the next barrier problems (7) while the present one is solved well enough."""
-        least = 0.1 * self.options.tolerance
+        least = _BARRIER_LEAST * self.options.tolerance
         while self.mu > least and errors.of(self.mu) <= self.options.barrier_accuracy * self.mu:
             self.mu = max(least, min(_SLOWER * self.mu, self.mu**_FASTER))
-            self.filter = []
+            self.filter.clear()
 
     # --- one step ---------------------------------------------------------------------------------------------------
 
@@ -247,50 +249,38 @@ class _Iteration:
         barrier.derivatives(self.bounds, point.s, self.z_low, self.z_high, self.mu, self.weight, self.slope)
         direction = self._direction(point.c, point.gap)
         while direction is not None:
-            dw, ds, lam, nu = direction
-            accepted = self._search(dw, ds)
+            accepted = self._search(direction)
             if accepted is not None:
                 length, self.point = accepted
-                self._move_multipliers(point, length, ds, lam, nu)
+                self._move_multipliers(point, length, direction)
                 return True
-            self.curvature = max(_CURVATURE_FIRST, _CURVATURE_UP * self.curvature)
-            if self.curvature > _CURVATURE_TRIED:
+            delta = self.regularization.after_rejection()
+            if delta is None:
                 return False
-            direction = self._direction(point.c, point.gap, self.curvature)
+            direction = self._direction(point.c, point.gap, delta)
         return False
 
-    def _direction(
-        self, c: np.ndarray, gap: np.ndarray, curvature: float = 0.0
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
-        """Return the Newton step of w and s for these residuals, and the multipliers after it; None if there is none."""
-        stages, newton, n_rows = self.stages, self.newton, len(self.unequal)
+    def _direction(self, c: np.ndarray, gap: np.ndarray, delta: float = 0.0) -> _Direction | None:
+        """Return the Newton step (13) for these residuals, with at least this δ_w; None if there is none."""
+        newton, n_rows = self.newton, len(self.unequal)
         weight, slope = self.weight, self.slope
-        pull = weight * gap + slope
-        q, diagonal = stages.gradient.copy(), np.full(len(self.w), curvature)
-        q[self.bounded] += pull[n_rows:]
+        pull = weight * gap + slope  # the slacks' share of the gradient, once ds = J dw + gap is substituted
+        gradient, diagonal = self.stages.gradient.values.copy(), np.full(len(self.point.w), delta)
+        gradient[self.bounded] += pull[n_rows:]
         diagonal[self.bounded] += weight[n_rows:]
-        stages.state(newton, q, diagonal, weight[:n_rows], pull[:n_rows], c, self.fixed)
+        newton.write(Terms(gradient, diagonal, weight[:n_rows], pull[:n_rows]), c)
         while not newton.solve():
-            more = self._more_curvature(curvature)
-            if more > _CURVATURE_MOST:
+            more = self.regularization.more(delta)
+            if more is None:
                 return None
-            newton.add_to_diagonal(more - curvature)
-            curvature = more
-        self.added = curvature
-        if curvature > 0.0:
-            self.curvature = curvature
-        dw = np.empty_like(self.w)
-        lam = stages.unpack(newton, dw, self.fixed)
-        ds = np.concatenate([stages.inequality_change(newton.y), dw[self.bounded]]) + gap
-        return dw, ds, lam, slope + weight * ds
-
-    def _more_curvature(self, curvature: float) -> float:
-        """Return the next δ_w to try after ``curvature`` was too little (algorithm IC)."""
-        if curvature == 0.0:
-            return (
-                _CURVATURE_FIRST if self.curvature == 0.0 else max(_CURVATURE_LEAST, _CURVATURE_DOWN * self.curvature)
-            )
-        return curvature * (_CURVATURE_UP_FIRST if self.curvature == 0.0 else _CURVATURE_UP)
+            newton.add_to_diagonal(more - delta)
+            delta = more
+        self.delta = delta
+        if delta > 0.0:
+            self.regularization.last = delta
+        dw = newton.step()
+        ds = np.concatenate([newton.inequality_change(), dw[self.bounded]]) + gap
+        return _Direction(dw, ds, newton.multipliers(), slope + weight * ds)
 
     def _to_bounds(self, ds: np.ndarray) -> float:
         """Return how much of the step the slacks allow (15a)."""
@@ -301,14 +291,14 @@ class _Iteration:
         """Share of a distance that a step may use up, τ of (8)."""
         return max(_TO_BOUND, 1.0 - self.mu)
 
-    def _search(self, dw: np.ndarray, ds: np.ndarray) -> tuple[float, _Point] | None:
+    def _search(self, direction: _Direction) -> tuple[float, _Point] | None:
         """Return how far along the step to go, and the point there (section 2.3); None: nowhere."""
-        point = self.point
-        descent = float(self.stages.gradient @ dw + self.slope @ ds)
+        point, (dw, ds, _, _) = self.point, direction
+        descent = float(self.stages.gradient.values @ dw + self.slope @ ds)
         longest = length = self._to_bounds(ds)
         while length > _SHORTEST * longest:
             trial = self._at(point.w + length * dw, point.s + length * ds)
-            if self._acceptable(trial, length, descent):
+            if self._accepts(trial, length, descent):
                 return length, trial
             if length == longest and trial.theta >= point.theta:
                 corrected = self._corrected(trial, length, descent)
@@ -318,7 +308,7 @@ class _Iteration:
         return None
 
     def _corrected(self, trial: _Point, length: float, descent: float) -> _Point | None:
-        """Return a point that the second-order correction reaches and the filter accepts, or None."""
+        """Return a point that the second-order correction (section 2.4) reaches and the filter accepts, or None."""
         point, before = self.point, self.point.theta
         c, gap = point.c.copy(), point.gap.copy()
         step = length
@@ -326,40 +316,25 @@ class _Iteration:
             if not np.isfinite(trial.theta):
                 return None
             c, gap = step * c + trial.c, step * gap + trial.gap
-            direction = self._direction(c, gap, self.added)
+            direction = self._direction(c, gap, self.delta)
             if direction is None:
                 return None
-            dw, ds, *_ = direction
-            step = self._to_bounds(ds)
-            trial = self._at(point.w + step * dw, point.s + step * ds)
-            if self._acceptable(trial, length, descent):
+            step = self._to_bounds(direction.ds)
+            trial = self._at(point.w + step * direction.dw, point.s + step * direction.ds)
+            if self._accepts(trial, length, descent):
                 return trial
             if trial.theta > _CORRECTION_GAIN * before:
                 return None
             before = trial.theta
         return None
 
-    def _acceptable(self, trial: _Point, length: float, descent: float) -> bool:
-        """Return whether a trial is better than the point and all of the filter; enter the point into it if it must."""
-        point = self.point
-        theta, phi, phi_then = point.theta, self._phi(point), self._phi(trial)
-        if not (np.isfinite(trial.theta) and np.isfinite(phi_then)) or trial.theta > self._limits[1]:
-            return False
-        if any(trial.theta >= a and phi_then >= b for a, b in self.filter):
-            return False
-        forgiven = _ROUNDING * abs(phi)
-        descends = descent < 0.0 and length * (-descent) ** _SWITCH_PHI > theta**_SWITCH_THETA
-        if descends and theta <= self._limits[0]:
-            return phi_then - phi - forgiven <= _ARMIJO * length * descent
-        if trial.theta > (1 - _THETA_MARGIN) * theta and phi_then - phi - forgiven > -_PHI_MARGIN * theta:
-            return False
-        enough = descends and phi_then - phi - forgiven <= _ARMIJO * length * descent
-        if not enough:
-            self.filter.append(((1 - _THETA_MARGIN) * theta, phi - _PHI_MARGIN * theta))
-        return True
+    def _accepts(self, trial: _Point, length: float, descent: float) -> bool:
+        return self.filter.accepts(trial.merit(self.mu), self.point.merit(self.mu), length, descent)
 
-    def _move_multipliers(self, point: _Point, length: float, ds: np.ndarray, lam: np.ndarray, nu: np.ndarray) -> None:
+    def _move_multipliers(self, point: _Point, length: float, direction: _Direction) -> None:
         """Move the multipliers of the point that was left (14), and keep those of bounds in range (16)."""
-        self.lam += length * (lam - self.lam)
-        self.nu += length * (nu - self.nu)
-        barrier.move_multipliers(self.bounds, point.s, self.point.s, ds, self.z_low, self.z_high, self.mu, self._keep)
+        self.lam += length * (direction.lam - self.lam)
+        self.nu += length * (direction.nu - self.nu)
+        barrier.update_multipliers(
+            self.bounds, point.s, self.point.s, direction.ds, self.z_low, self.z_high, self.mu, self._keep
+        )

@@ -1,4 +1,4 @@
-"""What all solvers of multi-stage problems are told, and what they say."""
+"""Options and results that all solvers of multi-stage problems share."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ class SolverName(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class SolverOptions:
-    """How to solve; the defaults suit a good first guess."""
+    """How to solve a problem; the defaults suit a good first guess."""
 
     solver: str = SolverName.RICCATI
-    tolerance: float = 1e-4  # on optimality and constraints
+    tolerance: float = 1e-4  # on the scaled optimality conditions (5) of Wächter and Biegler (2006)
     max_iterations: int = 100
     initial_barrier: float = 1.0  # μ_0 of the interior-point method: high, where the guess is outside of the limits
     barrier_accuracy: float = 100.0  # how far a barrier problem is solved before the next, in multiples of μ
@@ -30,9 +30,9 @@ class SolverOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """Where a solver ended."""
+    """Where a solver ended, and why."""
 
-    w: np.ndarray  # (n_w,) variables of all knots
+    w: np.ndarray  # (n_w,) variables of all stages
     cost: float
     iterations: int
     status: str

@@ -1,8 +1,8 @@
 """Multi-stage optimal control problems, written one stage at a time and solved by an interior-point method.
 
-A *stage kind* holds the CasADi expressions of one knot: next state, cost, constraints. A *problem* is a sequence of
-stage kinds. Derivatives (exact Hessian included) are made once per kind and mapped over the knots of that kind, so that
-building a problem costs as much as differentiating a handful of knots, and a built problem serves every request of the
+A *stage kind* holds the CasADi expressions of one stage: next state, cost, constraints. A *problem* is a sequence of
+stage kinds. Derivatives (exact Hessian included) are made once per kind and evaluated at all stages of that kind, so that
+building a problem costs as much as differentiating a handful of stages, and a built problem serves every request of the
 same sequence: all numbers enter as stage parameters and bounds.
 
     min  Σ_k cost_k(x_k, u_k, p_k)
@@ -22,33 +22,34 @@ from aerial_planner.codegen.library import FunctionLibrary
 from aerial_planner.ocp.casadi_nlp import FlatProgram
 from aerial_planner.ocp.interior_point import InteriorPoint
 from aerial_planner.ocp.options import SolverName, SolverOptions
+from aerial_planner.ocp.ragged import starts_of
 from aerial_planner.ocp.stage import StageData, StageEvaluation, StageKind
 
-_ACTIVE = 1e-3  # an inequality nearer to its bound than this holds the optimum back
+_ACTIVE = 1e-3  # distance to its bound below which an inequality is active
 _DEFAULTS = SolverOptions()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Solution:
-    """What a solver returned, knot by knot."""
+    """What a solver returned, stage by stage; to be used only if ``converged`` and ``max_violation`` allow."""
 
-    x: list[np.ndarray]
-    u: list[np.ndarray]
+    x: list[np.ndarray]  # (n_x,) of each stage
+    u: list[np.ndarray]  # (n_u,) of each stage
     cost: float
     iterations: int
     status: str
     converged: bool
     max_violation: float  # of any constraint or bound
-    binding: tuple[str, ...]  # the inequalities that hold the optimum back at most knots, most first
+    binding: tuple[str, ...]  # labels of the active inequalities, those of most stages first
 
 
 class Problem:
     """A sequence of stage kinds, built once and solved for many requests.
 
     Args:
-        kinds: of each knot.
+        kinds: stage kind of each stage; stages with the same object share functions.
         options: of the solver.
-        library: compiled stage functions, for our own solver; None: interpreted ones.
+        library: of compiled stage functions, for our own solver; None: interpreted ones.
 
     Raises:
         ValueError: if a kind does not lead to the states of the next one.
@@ -68,19 +69,24 @@ class Problem:
         self.kinds = list(kinds)
         self.options = options
         self._library = library
-        ends = np.cumsum([n for kind in kinds for n in (kind.x.numel(), kind.u.numel())]).tolist()
-        self._parts = [slice(*pair) for pair in pairwise([0, *ends])]  # of w: x_0, u_0, x_1, …
+        starts = starts_of([n for kind in kinds for n in (kind.x.numel(), kind.u.numel())]).tolist()
+        self._parts = [slice(*pair) for pair in pairwise(starts)]  # of w: x_0, u_0, x_1, …
         rows = [(np.zeros(kind.n_next), kind.lower, kind.upper) for kind in kinds]
         self._lower = np.concatenate([part for zero, low, _ in rows for part in (zero, low)])
         self._upper = np.concatenate([part for zero, _, up in rows for part in (zero, up)])
         self._labels = [label for kind in kinds for label in ("dynamics",) * kind.n_next + kind.labels]
+        self._solver: InteriorPoint | FlatProgram
         if SolverName(options.solver) is SolverName.RICCATI:
             self._solver = InteriorPoint(self.kinds, self._evaluation_of, options)
         else:
             self._solver = FlatProgram(self.kinds, options)
 
     def solve(self, stages: Sequence[StageData]) -> Solution:
-        """Return the optimum from the stages' guess; check ``converged`` and ``max_violation`` before using it."""
+        """Return the local optimum that the solver finds from the guess.
+
+        Args:
+            stages: parameters, bounds and guess of each stage.
+        """
         guess, p, lower, upper = _flat(stages)
         outcome = self._solver.solve(guess, p, lower, upper)
         g = self._solver.constraints(outcome.w, p)
@@ -100,7 +106,7 @@ class Problem:
         )
 
     def violation(self, stages: Sequence[StageData]) -> float:
-        """Return by how much the stages' guess violates any constraint or bound."""
+        """Return the largest violation of any constraint or bound at the stages' guess."""
         w, p, lower, upper = _flat(stages)
         return self._excess(w, lower, upper, self._solver.constraints(w, p))
 
@@ -115,7 +121,7 @@ class Problem:
 
 
 def _flat(stages: Sequence[StageData]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return guess, parameters and bounds of all knots in one row each."""
+    """Return guess, parameters and bounds of all stages in one row each."""
     guess = [part for s in stages for part in (s.x, s.u)]
     lower = [part for s in stages for part in (s.x_min, s.u_min)]
     upper = [part for s in stages for part in (s.x_max, s.u_max)]

@@ -3,458 +3,290 @@
     min  Σ_k ½ y_kᵀ Q_k y_k + q_kᵀ y_k ,   y_k = (u_k, x_k)
     s.t. x_k+1 = F_k y_k + f_k ,   C_k y_k + c_k = 0 .
 
-This is a Newton step of an interior-point method. The recursion is Riccati's, extended to constraints as by Vanroye,
-Sathya, De Schutter and Decré, *FATROP: A fast constrained optimal control problem solver*, IROS 2023: from the last stage
-backward, rows that say something of the controls eliminate as many of them; what rows say of the state alone is handed to
-the stage before. Products of dense matrices are BLAS's (through SciPy), those with F, which is sparse, loops: a knot of a
-quadruped takes 0.03 ms.
+Each Newton step of an interior-point method is one: Rao, Wright and Rawlings, *Application of interior-point methods to model
+predictive control*, Journal of Optimization Theory and Applications 99 (1998). The recursion is Riccati's, extended to constraints as
+by Vanroye, Sathya, De Schutter and Decré, *FATROP: A fast constrained optimal control problem solver*, IROS 2023: from the
+last stage backward, constraints that contain controls eliminate as many of them; what constraints say of the state alone,
+the constraint-to-go H x + h = 0, is handed to the stage before. Products of dense matrices are BLAS's (through SciPy), those
+with F, which is sparse, loops: a stage of a quadruped takes 0.03 ms. ``elimination`` has the dense algebra of a stage.
 
-Stages differ in size, so what belongs to them lies in arrays with a row for each that are as wide as the widest needs.
+Stages differ in size; their matrices lie in arrays with an entry for each stage that is as large as the largest one needs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from aerial_model.numerics.jit import compiled, reordered
-from aerial_model.numerics.linalg import cholesky, lower_solve, upper_solve
+from aerial_model.numerics.jit import compiled
+from aerial_planner.ocp.elimination import (
+    add_cost_to_go,
+    add_product,
+    constraint_to_go,
+    minimize,
+    quadratic,
+    reduce_rows,
+    solved_for_first,
+    store,
+    substitute,
+    write_constraints,
+    write_next_constraints,
+)
 
-_RANK = 1e-9  # a pivot smaller than this share of the largest coefficient is none
+
+class Sizes(NamedTuple):
+    """How much each stage has of everything."""
+
+    nx: np.ndarray  # (K,) states
+    nu: np.ndarray  # (K,) controls
+    nc: np.ndarray  # (K,) equality constraints
+    n_links: np.ndarray  # (K,) nonzeros of F
+
+
+class Coefficients(NamedTuple):
+    """Matrices of all stages, columns in the order y = (u, x); what a stage does not need of them is not read."""
+
+    Q: np.ndarray  # (K, n_y, n_y) Hessian of the cost
+    q: np.ndarray  # (K, n_y) its gradient at 0
+    links: np.ndarray  # (K, n_F, 2) row and column of each nonzero of F
+    F: np.ndarray  # (K, n_F) the nonzeros themselves
+    f: np.ndarray  # (K, n_x) offset of the next state
+    C: np.ndarray  # (K, n_c, n_y) Jacobian of the constraints
+    c: np.ndarray  # (K, n_c) their offset
+
+    def after_first(self) -> Coefficients:
+        """Return those of all stages but the first, in memory that is shared."""
+        return Coefficients(*(array[1:] for array in self))
+
+
+class Optimum(NamedTuple):
+    """Solution of a linear-quadratic problem and its multipliers."""
+
+    y: np.ndarray  # (K, n_y)
+    dynamics: np.ndarray  # (K, n_x) of x_k+1 − F_k y_k − f_k = 0
+    constraints: np.ndarray  # (K, n_c) of C_k y_k + c_k = 0
+
+    def after_first(self) -> Optimum:
+        """Return that of all stages but the first, in memory that is shared."""
+        return Optimum(*(array[1:] for array in self))
+
+
+class Factor(NamedTuple):
+    """What the backward recursion finds out about each stage; m rows are its constraints and the next state's.
+
+    The controls are ordered (eliminated ones, free ones); 1 stands for the constant.
+    """
+
+    P: np.ndarray  # (K, n_x, n_x + 1) Hessian of the cost-to-go, and its gradient at 0
+    H: np.ndarray  # (K, m, n_x + 1) constraint-to-go [H h]
+    n_h: np.ndarray  # (K,) number of rows of H
+    H_rows: np.ndarray  # (K, m) which of the stage's reduced rows these are
+    T: np.ndarray  # (K, m, m) the stage's rows ↦ reduced rows
+    rank: np.ndarray  # (K,) number of eliminated controls
+    order: np.ndarray  # (K, n_y) original place of each ordered control
+    eliminated: np.ndarray  # (K, n_y, n_y + 1) (free controls, x, 1) ↦ minus the eliminated controls
+    slope: np.ndarray  # (K, n_y, n_y + 1) (free controls, x, 1) ↦ the cost's gradient by the eliminated controls
+    gain: np.ndarray  # (K, n_y, n_x + 1) (x, 1) ↦ free controls
+
+    @staticmethod
+    def zeros(K: int, n_x: int, n_y: int, m: int) -> Factor:
+        """Return memory for K stages of at most these sizes."""
+        return Factor(
+            P=np.zeros((K, n_x, n_x + 1)),
+            H=np.zeros((K, m, n_x + 1)),
+            n_h=np.zeros(K, dtype=np.int64),
+            H_rows=np.zeros((K, m), dtype=np.int64),
+            T=np.zeros((K, m, m)),
+            rank=np.zeros(K, dtype=np.int64),
+            order=np.zeros((K, n_y), dtype=np.int64),
+            eliminated=np.zeros((K, n_y, n_y + 1)),
+            slope=np.zeros((K, n_y, n_y + 1)),
+            gain=np.zeros((K, n_y, n_x + 1)),
+        )
 
 
 class LinearQuadratic:
-    """The numbers of one problem, and memory for its solution.
+    """A linear-quadratic problem, to be written, solved and read in the same memory any number of times.
+
+    The first state is free unless constraints say otherwise. To the recursion it is the control of one more stage, before
+    all others, which has no state and no cost and leads to x_0 = u.
 
     Args:
-        nx: states of each stage ``(K,)``; the last one leads nowhere.
-        nu: its controls.
-        nc: its equality constraints.
-        links: row and column of each nonzero of its F ``(n, 2)``; few, as Euler steps have.
+        nx: number of states of each stage ``(K,)``; the last one leads nowhere.
+        nu: number of controls ``(K,)``.
+        nc: number of equality constraints ``(K,)``.
+        links: row and column of each nonzero of each stage's F ``(n_F, 2)``; few, as Euler steps have.
+
+    Attributes:
+        sizes: of the stages.
+        coefficients: of the stages, to be written before ``solve``.
+        optimum: what ``solve`` writes.
     """
 
-    def __init__(self, nx: np.ndarray, nu: np.ndarray, nc: np.ndarray, links: Sequence[np.ndarray]) -> None:
-        self.nx, self.nu, self.nc = (np.array(n, dtype=np.int64) for n in (nx, nu, nc))
-        K, x, c = len(nx), int(max(nx)), int(max(nc))
-        y = int(max(self.nx + self.nu))
-        self.Q, self.q = np.zeros((K, y, y)), np.zeros((K, y))
-        self.n_links = np.array([len(pairs) for pairs in links], dtype=np.int64)
-        self.links = np.zeros((K, max(self.n_links), 2), dtype=np.int64)
-        for k, pairs in enumerate(links):
-            self.links[k, : len(pairs)] = pairs
-        self.F, self.f = np.zeros(self.links.shape[:2]), np.zeros((K, x))  # the nonzeros
-        self.C, self.c = np.zeros((K, c, y)), np.zeros((K, c))
-        self.y = np.zeros((K, y))  # solution
-        self.dynamics = np.zeros((K, x))  # multipliers of x_k+1 − F_k y_k − f_k = 0
-        self.constraints = np.zeros((K, c))  # multipliers of C_k y_k + c_k = 0
-        rows = c + x  # of a stage: its own and those of the state after it
-        self._factor = (
-            np.zeros((K, x, x + 1)),  # P, p: the cost to go
-            np.zeros((K + 1, rows, x + 1)),  # H, h: what is asked of the state
-            np.zeros(K + 1, dtype=np.int64),  # how many rows that has
-            np.zeros((K + 1, rows), dtype=np.int64),  # which of the stage's rows they are
-            np.zeros((K + 1, rows, rows)),  # T: from the stage's rows to the reduced ones
-            np.zeros(K + 1, dtype=np.int64),  # how many controls the rows eliminate; of stage K: initial states
-            np.zeros((K + 1, y), dtype=np.int64),  # the order of the controls, those eliminated first
-            np.zeros((K + 1, y, y + 1)),  # eliminated controls from the others, the state and one
-            np.zeros((K + 1, y, y + 1)),  # slope of a stage's own cost by these, from the same
-            np.zeros((K + 1, y, x + 1)),  # the other controls from the state and one
+    def __init__(
+        self, nx: Sequence[int] | np.ndarray, nu: np.ndarray, nc: np.ndarray, links: Sequence[np.ndarray]
+    ) -> None:
+        before = [np.column_stack([np.arange(nx[0])] * 2)]  # of the stage that chooses the first state
+        self._sizes = Sizes(
+            nx=np.array([0, *nx], dtype=np.int64),
+            nu=np.array([nx[0], *nu], dtype=np.int64),
+            nc=np.array([0, *nc], dtype=np.int64),
+            n_links=np.array([len(pairs) for pairs in [*before, *links]], dtype=np.int64),
         )
+        self.sizes = Sizes(*(count[1:] for count in self._sizes))
+        K, n_x, n_c, n_F = 1 + len(nx), int(max(nx)), int(max(nc)), int(max(self._sizes.n_links))
+        n_y = int(max(self._sizes.nx + self._sizes.nu))
+        self._coefficients = Coefficients(
+            Q=np.zeros((K, n_y, n_y)),
+            q=np.zeros((K, n_y)),
+            links=np.zeros((K, n_F, 2), dtype=np.int64),
+            F=np.zeros((K, n_F)),
+            f=np.zeros((K, n_x)),
+            C=np.zeros((K, n_c, n_y)),
+            c=np.zeros((K, n_c)),
+        )
+        for k, pairs in enumerate([*before, *links]):
+            self._coefficients.links[k, : len(pairs)] = pairs
+        self._coefficients.F[0] = 1.0
+        self._optimum = Optimum(y=np.zeros((K, n_y)), dynamics=np.zeros((K, n_x)), constraints=np.zeros((K, n_c)))
+        self._factor = Factor.zeros(K, n_x, n_y, m=n_c + n_x)
+        self.coefficients, self.optimum = self._coefficients.after_first(), self._optimum.after_first()
 
     def add_to_diagonal(self, value: float) -> None:
-        """Add to the curvature of every variable."""
-        every = np.arange(self.Q.shape[1])
-        self.Q[:, every, every] += value
+        """Add a multiple of the identity to the Hessian of every stage."""
+        every = np.arange(self.coefficients.Q.shape[1])
+        self.coefficients.Q[:, every, every] += value
 
     def solve(self) -> bool:
-        """Write the solution and the multipliers; return False if there is no minimum.
+        """Write the solution and the multipliers into ``optimum``; return False, and write none, if there is no minimum.
 
-        That is, a direction has no curvature, or rows of the states alone pile up from stage to stage.
+        There is none if a direction that the constraints leave free has no positive curvature, or if more constraints of
+        states alone are handed from stage to stage than a stage has states.
         """
-        sizes = self.nx, self.nu, self.nc
-        steps = self.n_links, self.links, self.F, self.f
-        if not _backward(*sizes, *steps, self.Q, self.q, self.C, self.c, self._factor):
+        if not _backward(self._sizes, self._coefficients, self._factor):
             return False
-        _forward(*sizes, *steps, self.y, self.dynamics, self.constraints, self._factor)
+        _forward(self._sizes, self._coefficients, self._factor, self._optimum)
         return True
 
 
-@reordered
-def _largest_row(rows: np.ndarray, first: int, end: int) -> tuple:
-    """Return which row from ``first`` to ``end`` has the largest entry, and the size of that."""
-    best, at = -1.0, first
-    for i in range(first, end):
-        size = 0.0
-        for j in range(rows.shape[1]):
-            entry = abs(rows[i, j])
-            size = entry if entry > size else size
-        if size > best:
-            best, at = size, i
-    return at, best
-
-
 @compiled
-def _reduce(U: np.ndarray, T: np.ndarray, order: np.ndarray) -> int:
-    """Bring rows U ``(m, n)`` to [1 S; 0 0] by full pivoting, and the unit matrix T to what does that; return the rank.
-
-    Columns change places, and ``order`` with them. With less than full pivoting errors grow from knot to knot.
-    """
-    m, n = U.shape
-    for i in range(m - 1, -1, -1):
-        if not np.any(U[i]):  # nothing to eliminate with: to the end
-            m -= 1
-            if i != m:
-                for j in range(n):
-                    U[i, j], U[m, j] = U[m, j], U[i, j]
-                for j in range(len(T)):
-                    T[i, j], T[m, j] = T[m, j], T[i, j]
-    largest = 0.0
-    for k in range(min(m, n)):
-        at_row, best = _largest_row(U, k, m)
-        largest = max(largest, best)
-        if not best > _RANK * largest:
-            return k
-        at_column = k
-        for j in range(n):
-            if abs(U[at_row, j]) == best:
-                at_column = j
-                break
-        if at_row != k:
-            for j in range(n):
-                U[k, j], U[at_row, j] = U[at_row, j], U[k, j]
-            for j in range(len(T)):
-                T[k, j], T[at_row, j] = T[at_row, j], T[k, j]
-        if at_column != k:
-            order[k], order[at_column] = order[at_column], order[k]
-            for i in range(m):
-                U[i, k], U[i, at_column] = U[i, at_column], U[i, k]
-        pivot, pivot_T = U[k, k:], T[k]
-        scale = 1.0 / pivot[0]
-        for j in range(n - k):  # loops are vectorized if they start at 0
-            pivot[j] *= scale
-        for j in range(len(T)):
-            pivot_T[j] *= scale
-        for i in range(m):
-            row, row_T = U[i, k:], T[i]
-            factor = row[0]
-            if i != k and factor != 0.0:
-                for j in range(n - k):
-                    row[j] -= factor * pivot[j]
-                for j in range(len(T)):
-                    row_T[j] -= factor * pivot_T[j]
-    return min(m, n)
-
-
-@compiled
-def _add_cost_to_go(
-    M: np.ndarray, P: np.ndarray, links: np.ndarray, F: np.ndarray, f: np.ndarray, place: np.ndarray
-) -> None:
-    """Add that of the next state, ½ [x; 1]ᵀ P [x; 1] with x = F y + f, to ½ [y; 1]ᵀ M [y; 1], y in the order ``place``."""
-    x, y = len(P) - 1, len(M) - 1
-    W = np.zeros((y + 1, x))  # of the slope by x, from [y; 1]
-    for n in range(len(links)):
-        i, j = links[n, 0], place[links[n, 1]]
-        for a in range(x):
-            W[j, a] += F[n] * P[i, a]
-    for i in range(x + 1):
-        factor = f[i] if i < x else 1.0
-        for a in range(x):
-            W[y, a] += factor * P[i, a]
-    across = np.ascontiguousarray(W.T)
-    for n in range(len(links)):
-        i, j = links[n, 0], place[links[n, 1]]
-        for a in range(y + 1):
-            M[j, a] += F[n] * across[i, a]
-
-
-@compiled
-def _eliminate(M: np.ndarray, N: np.ndarray, Y: np.ndarray) -> None:
-    """Let the first variables of ½ [y; 1]ᵀ M [y; 1] be −N times the others: what is left is M's last block, above its diagonal.
-
-    Writes into Y what the slope by the first ones is, from the others.
-    """
-    rank, rest = N.shape
-    if rank == 0:
-        return
-    first, Z = np.empty((rank, rank)), np.empty((rank, rest))
-    for i in range(rank):
-        for j in range(rank):
-            first[i, j] = M[min(i, j), max(i, j)]
-        row = M[i, rank:]
-        for j in range(rest):
-            Z[i, j] = row[j]
-    half = np.dot(first, N)
-    for i in range(rank):
-        for j in range(rest):
-            Y[i, j] = Z[i, j] - half[i, j]
-            Z[i, j] -= 0.5 * half[i, j]
-    twice = np.dot(N.T, Z)  # NᵀM₁₂ − ½ NᵀM₁₁N, which its transpose completes
-    for i in range(rest):
-        row, ahead = M[rank + i, rank + i :], twice[i, i:]
-        for j in range(rest - i):
-            row[j] -= ahead[j] + twice[i + j, i]
-
-
-@compiled
-def _minimized(M: np.ndarray, rank: int, free: int, gains: np.ndarray) -> tuple:
-    """Return M's last block minimized over its first ``free`` variables, and whether it has a minimum.
-
-    Writes into ``gains`` ``(free, ·)`` what these are, from the others.
-    """
-    first = rank + free
-    left = len(M) - first
-    A, L = np.empty((free, free)), np.zeros((free, free))
-    for i in range(free):
-        for j in range(i + 1):
-            A[i, j] = M[rank + j, rank + i]
-    cost = np.empty((left, left))
-    if not cholesky(A, L) > 0.0:
-        return cost, False
-    for i in range(left):
-        row = M[first + i, first:]
-        for j in range(left):
-            cost[i, j] = row[j]
-    if free > 0:
-        V = np.empty((free, left))
-        for i in range(free):
-            row = M[rank + i, first:]
-            for j in range(left):
-                V[i, j] = row[j]
-        lower_solve(L, V)
-        cost -= np.dot(V.T, V)
-        upper_solve(L, V)
-        for i in range(free):
-            for a in range(left):
-                gains[i, a] = -V[i, a]
-    for i in range(left):
-        for j in range(i):
-            cost[i, j] = cost[j, i]
-    return cost, True
-
-
-@compiled
-def _own_rows(C: np.ndarray, c: np.ndarray, U: np.ndarray, X: np.ndarray) -> None:
-    """Write a stage's C (u, x) + c = 0 as the first rows of U u + X [x; 1] = 0."""
-    u, x = U.shape[1], X.shape[1] - 1
-    for i in range(len(c)):
-        for j in range(u):
-            U[i, j] = C[i, j]
-        for j in range(x):
-            X[i, j] = C[i, u + j]
-        X[i, x] = c[i]
-
-
-@compiled
-def _asked_rows(
-    H: np.ndarray, links: np.ndarray, F: np.ndarray, f: np.ndarray, own: int, U: np.ndarray, X: np.ndarray
-) -> None:
-    """Write what is asked of the next state, H [x; 1] = 0, as the rows of U u + X [x; 1] = 0 after the first ``own``."""
-    u, x = U.shape[1], X.shape[1] - 1
-    for i in range(len(U) - own):
-        X[own + i, x] = H[i, len(f)]
-        for n in range(len(links)):
-            amount, j = H[i, links[n, 0]] * F[n], links[n, 1]
-            if j < u:
-                U[own + i, j] += amount
-            else:
-                X[own + i, j - u] += amount
-        for j in range(len(f)):
-            X[own + i, x] += H[i, j] * f[j]
-
-
-@compiled
-def _eliminated(U: np.ndarray, X: np.ndarray, rank: int) -> np.ndarray:
-    """Return N ``(rank, ·)`` of reduced rows: the first controls are −N times the others, the state and one."""
-    free, x = U.shape[1] - rank, X.shape[1]
-    N = np.empty((rank, free + x))
-    for i in range(rank):
-        row, into = U[i, rank:], N[i, free:]
-        for j in range(free):
-            N[i, j] = row[j]
-        for j in range(x):
-            into[j] = X[i, j]
-    return N
-
-
-@compiled
-def _own_cost(Q: np.ndarray, q: np.ndarray, u: int, place: np.ndarray) -> np.ndarray:
-    """Return ½ yᵀ Q y + qᵀ y as a matrix of [y; 1], controls at their ``place``; only its upper triangle counts."""
-    y = len(place) - 1
-    M = np.zeros((y + 1, y + 1))
-    for i in range(y):
-        into, row = M[place[i]], Q[i]
-        for j in range(u):
-            into[place[j]] = row[j]
-        into, row = into[u:], row[u:]
-        for j in range(y - u):
-            into[j] = row[j]
-        into[y - u] = q[i]
-    return M
-
-
-@compiled
-def _keep(A: np.ndarray, k: int, B: np.ndarray, rows: int) -> None:
-    """Write the first ``rows`` of a matrix into block ``k`` of A, in a third of the time an assignment of slices takes."""
-    for i in range(rows):
-        for j in range(B.shape[1]):
-            A[k, i, j] = B[i, j]
-
-
-@compiled
-def _hand_on(X: np.ndarray, rank: int, H: np.ndarray, kept: np.ndarray) -> int:
-    """Write the rows after the first ``rank`` that say something of the state, and which these are; return how many.
-
-    It is −1 if there are more than H has room for.
-    """
-    count, x = 0, X.shape[1] - 1
-    for i in range(rank, len(X)):
-        largest = 0.0
-        for j in range(x):
-            largest = max(largest, abs(X[i, j]))
-        if largest > _RANK:
-            if count == len(H):
-                return -1
-            for j in range(x + 1):
-                H[count, j] = X[i, j]
-            kept[count] = i
-            count += 1
-    return count
-
-
-@compiled
-def _backward(
-    nx: np.ndarray,
-    nu: np.ndarray,
-    nc: np.ndarray,
-    n_links: np.ndarray,
-    all_links: np.ndarray,
-    F: np.ndarray,
-    f: np.ndarray,
-    Q: np.ndarray,
-    q: np.ndarray,
-    C: np.ndarray,
-    c: np.ndarray,
-    factor: tuple,
-) -> bool:
+def _backward(sizes: Sizes, coefficients: Coefficients, factor: Factor) -> bool:
     """Fill ``factor`` from the last stage to the first; return whether there is a minimum."""
-    P, H, n_h, kept, T, ranks, orders, others, slopes, gains = factor
+    nx, nu, n_links = sizes.nx, sizes.nu, sizes.n_links
+    Q, q, links, F, f, _, _ = coefficients
     K = len(nx)
-    to_go = np.zeros((1, 1))  # [x; 1] of the stage after
-    itself = np.empty((nx[0], 2), dtype=np.int64)  # links of the step before the first
-    itself[:, 0] = itself[:, 1] = np.arange(nx[0])
-    for k in range(K - 1, -2, -1):
-        # The first state is like controls of a stage before it, K as it were, that costs nothing by itself.
-        first = k < 0
-        at = K if first else k
-        x, u, own = (0, nx[0], 0) if first else (nx[k], nu[k], nc[k])
-        after, x_next = (n_h[k + 1], nx[k + 1]) if k + 1 < K else (0, 0)
-        links = itself if first else all_links[k, : n_links[k]]
-        steps, offset = (np.ones(u), np.zeros(u)) if first else (F[k], f[k, :x_next])
-        m = own + after
-        if m > T.shape[1]:
-            return False  # rows of states pile up that no control can satisfy
-
-        U, X, change = np.zeros((m, u)), np.zeros((m, x + 1)), np.eye(m)
-        if own > 0:
-            _own_rows(C[k], c[k, :own], U, X)
-        if after > 0:
-            _asked_rows(H[k + 1], links, steps, offset, own, U, X)
-        order = np.arange(u)
-        rank = _reduce(U, change, order)
-        X = np.dot(change, X)
-        N = _eliminated(U, X, rank)
-        place = np.arange(u + x + 1)
-        place[order] = np.arange(u)
-        ranks[at], orders[at, :u] = rank, order
-        _keep(T, at, change, m)
-        _keep(others, at, N, rank)
-
-        M = np.zeros((u + 1, u + 1)) if first else _own_cost(Q[k], q[k], u, place)
+    to_go = np.zeros((1, 1))  # cost-to-go of the next state, as a matrix of [x; 1]
+    for k in range(K - 1, -1, -1):
+        U, X = _rows(k, sizes, coefficients, factor)
+        if len(U) > factor.T.shape[1]:
+            return False  # constraints of states pile up that no control can satisfy
+        X, N, place = _eliminated(k, U, X, factor)
+        rank = len(N)
+        M = quadratic(Q[k], q[k], nu[k], place)
         if k + 1 < K:
-            _add_cost_to_go(M, to_go, links, steps, offset, place)
-        _eliminate(M, N, slopes[at, :rank, : N.shape[1]])
-        to_go, bounded = _minimized(M, rank, u - rank, gains[at])
+            add_cost_to_go(M, to_go, links[k, : n_links[k]], F[k], f[k, : nx[k + 1]], place)
+        substitute(M, N, factor.slope[k, :rank, : N.shape[1]])
+        to_go, bounded = minimize(M, rank, nu[k] - rank, factor.gain[k])
         if not bounded:
             return False
-        if not first:
-            _keep(P, k, to_go, x)
-            n_h[k] = _hand_on(X, rank, H[k], kept[k])
-            if n_h[k] < 0:
-                return False
+        store(factor.P, k, to_go, nx[k])
+        factor.n_h[k] = constraint_to_go(X, rank, factor.H[k], factor.H_rows[k])
+        if factor.n_h[k] < 0:
+            return False
     return True
 
 
-@reordered
-def _add_product(
-    A: np.ndarray, k: int, rows: int, columns: int, factor: float, v: np.ndarray, into: np.ndarray
-) -> None:
-    """Add the product of a block of ``A`` ``(K, ·, ·)`` with a vector, times ``factor``."""
-    for i in range(rows):
-        total = 0.0
-        for j in range(columns):
-            total += A[k, i, j] * v[j]
-        into[i] += factor * total
+@compiled
+def _rows(k: int, sizes: Sizes, coefficients: Coefficients, factor: Factor) -> tuple[np.ndarray, np.ndarray]:
+    """Return a stage's constraints and those of the next state as U u + X [x; 1] = 0, ``(m, n_u)`` and ``(m, n_x + 1)``."""
+    last = k + 1 == len(sizes.nx)
+    own, after = sizes.nc[k], 0 if last else factor.n_h[k + 1]
+    U, X = np.zeros((own + after, sizes.nu[k])), np.zeros((own + after, sizes.nx[k] + 1))
+    write_constraints(coefficients.C[k], coefficients.c[k, :own], U, X)
+    if after > 0:
+        links, f = coefficients.links[k, : sizes.n_links[k]], coefficients.f[k, : sizes.nx[k + 1]]
+        write_next_constraints(factor.H[k + 1], links, coefficients.F[k], f, U[own:], X[own:])
+    return U, X
 
 
 @compiled
-def _forward(
-    nx: np.ndarray,
-    nu: np.ndarray,
-    nc: np.ndarray,
-    n_links: np.ndarray,
-    links: np.ndarray,
-    F: np.ndarray,
-    f: np.ndarray,
-    y: np.ndarray,
-    dynamics: np.ndarray,
-    constraints: np.ndarray,
-    factor: tuple,
-) -> None:
+def _eliminated(k: int, U: np.ndarray, X: np.ndarray, factor: Factor) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Solve a stage's rows U u + X [x; 1] = 0 for as many controls as there can be, and note in ``factor`` how.
+
+    Returns:
+        The reduced rows' X; N ``(rank, ·)`` such that the eliminated controls are −N (free controls, x, 1); and at which
+        place each entry of (u, x, 1) stands once the controls are ordered.
+    """
+    m, n_u = U.shape
+    T, order = np.eye(m), np.arange(n_u)
+    rank = reduce_rows(U, T, order)
+    X = np.dot(T, X)
+    N = solved_for_first(U, X, rank)
+    place = np.arange(n_u + X.shape[1])
+    place[order] = np.arange(n_u)
+    factor.rank[k], factor.order[k, :n_u] = rank, order
+    store(factor.T, k, T, m)
+    store(factor.eliminated, k, N, rank)
+    return X, N, place
+
+
+@compiled
+def _forward(sizes: Sizes, coefficients: Coefficients, factor: Factor, optimum: Optimum) -> None:
     """Write solution and multipliers from the first stage to the last."""
-    P, H, n_h, kept, T, ranks, orders, others, slopes, gains = factor
+    nx, nu, nc, n_links = sizes
     K = len(nx)
-    x, pushes = np.zeros(0), np.zeros(0)  # the state, and the multipliers of what is asked of it
-    for k in range(-1, K):
-        at = k if k >= 0 else K
-        n_u, own = (nu[k], nc[k]) if k >= 0 else (nx[0], 0)
-        n_x, rank = len(x), ranks[at]
-        after = n_h[k + 1] if k + 1 < K else 0
-        free, m, n_left = n_u - rank, own + after, n_u - rank + n_x + 1
-        left = np.zeros(n_left)  # the controls that rows leave free, the state and one
-        left[free : n_left - 1] = x
-        left[n_left - 1] = 1.0
-        _add_product(gains, at, free, n_x + 1, 1.0, left[free:], left)
-        eliminated = np.zeros(rank)
-        _add_product(others, at, rank, n_left, -1.0, left, eliminated)
-        u = np.empty(n_u)
-        for i in range(n_u):
-            u[orders[at, i]] = eliminated[i] if i < rank else left[i - rank]
-        reduced, of_rows = np.zeros(m), np.zeros(m)
-        _add_product(slopes, at, rank, n_left, -1.0, left, reduced)
-        if k >= 0:
-            for i in range(n_h[k]):
-                reduced[kept[k, i]] = pushes[i]
-        for i in range(m):
-            for j in range(m):
-                of_rows[j] += T[at, i, j] * reduced[i]
-        pushes = of_rows[own:]
-        if k < 0:
-            x = u
-            continue
-        y[k, :n_u] = u
-        y[k, n_u : n_u + n_x] = x
-        constraints[k, :own] = of_rows[:own]
+    x, lam_H = np.zeros(0), np.zeros(0)  # the state, and the multipliers of the constraint-to-go on it
+    for k in range(K):
+        y = optimum.y[k, : nu[k] + nx[k]]
+        y[nu[k] :] = x
+        lam = _controls(k, factor, lam_H, nc[k] + (factor.n_h[k + 1] if k + 1 < K else 0), nu[k], y)
+        optimum.constraints[k, : nc[k]] = lam[: nc[k]]
+        lam_H = lam[nc[k] :]
         if k + 1 < K:
             n = nx[k + 1]
-            x = np.ones(n + 1)
-            x[:n] = f[k, :n]
+            x_1 = np.ones(n + 1)  # the next state and one
+            x_1[:n] = coefficients.f[k, :n]
             for i in range(n_links[k]):
-                x[links[k, i, 0]] += F[k, i] * y[k, links[k, i, 1]]
-            gradient = np.zeros(n)
-            _add_product(P, k + 1, n, n + 1, 1.0, x, gradient)
-            x = x[:n]
-            for i in range(after):
+                x_1[coefficients.links[k, i, 0]] += coefficients.F[k, i] * y[coefficients.links[k, i, 1]]
+            gradient = np.zeros(n)  # of all that follows, by the next state
+            add_product(factor.P, k + 1, n, n + 1, 1.0, x_1, gradient)
+            x = x_1[:n]
+            for i in range(len(lam_H)):
                 for j in range(n):
-                    gradient[j] += pushes[i] * H[k + 1, i, j]
-            dynamics[k, :n] = -gradient
+                    gradient[j] += lam_H[i] * factor.H[k + 1, i, j]
+            optimum.dynamics[k, :n] = -gradient
+
+
+@compiled
+def _controls(k: int, factor: Factor, lam_H: np.ndarray, m: int, n_u: int, y: np.ndarray) -> np.ndarray:
+    """Write the controls of a stage into y = (u, x), whose state is given; return the multipliers of its rows ``(m,)``.
+
+    Args:
+        k: stage.
+        factor: of all stages.
+        lam_H: multipliers of the constraint-to-go on the state.
+        m: number of the stage's rows: its constraints, then those of the next state.
+        n_u: number of controls.
+        y: states and controls ``(n_u + n_x,)``.
+    """
+    rank, n_x = factor.rank[k], len(y) - n_u
+    free = n_u - rank
+    n = free + n_x + 1
+    left = np.zeros(n)  # the free controls, the state and one
+    left[free : n - 1] = y[n_u:]
+    left[n - 1] = 1.0
+    add_product(factor.gain, k, free, n_x + 1, 1.0, left[free:], left)
+    eliminated = np.zeros(rank)
+    add_product(factor.eliminated, k, rank, n, -1.0, left, eliminated)
+    for i in range(n_u):
+        y[factor.order[k, i]] = eliminated[i] if i < rank else left[i - rank]
+    reduced, lam = np.zeros(m), np.zeros(m)  # multipliers of the reduced rows, and of the rows themselves
+    add_product(factor.slope, k, rank, n, -1.0, left, reduced)
+    for i in range(factor.n_h[k]):
+        reduced[factor.H_rows[k, i]] = lam_H[i]
+    for i in range(m):
+        for j in range(m):
+            lam[j] += factor.T[k, i, j] * reduced[i]
+    return lam
