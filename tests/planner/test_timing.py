@@ -11,7 +11,8 @@ from aerial_model.numerics import rotation
 from aerial_model.robot.robot import BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY
 from aerial_model.values.request import MotionRequest
 from aerial_planner.assembly.library import PlanLibrary
-from aerial_planner.motion.schedule import Phase, load_motion
+from aerial_planner.motion.motion import Phase, load_motion
+from aerial_planner.motion.schedule import contact_schedule
 from aerial_planner.motion.start import Start
 from aerial_planner.reference.body import body_reference
 from aerial_planner.settings import PlannerSettings
@@ -71,9 +72,11 @@ def test_a_timed_flip_lands_level(timed):
 
 def test_no_fixed_duration_is_cheaper(planner, robot, timed):
     wanted, result = timed
-    stage, schedule = planner._stage(wanted), planner._schedule(wanted, load_motion(wanted.motion, robot))
-    reference = body_reference(schedule, Start.standing(robot), robot, planner._model, planner._ik, planner.settings)
-    guess, _ = planner._srbm.solve(schedule, reference)
+    stages, settings, start = planner._stages, planner.settings, Start.standing(robot)
+    stage = stages.kino_dynamic(wanted)
+    schedule = contact_schedule(wanted, load_motion(wanted.motion, robot), robot, settings.dt, settings.flight_knots)
+    reference = body_reference(schedule, start, robot, stages.model, stages.ik, settings)
+    guess, _ = stages.srbm.solve(schedule, reference)
     for stretch in (0.8, 1.0, 1.2):
         fixed = np.tile([stretch - 1e-4, stretch + 1e-4], (len(schedule.contact), 1))
         _, solution = stage.solve(dataclasses.replace(schedule, stretch_range=fixed), reference, guess)

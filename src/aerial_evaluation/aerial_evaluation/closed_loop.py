@@ -18,7 +18,8 @@ from aerial_model.values.frame import StartFrame
 from aerial_model.values.plan import Plan
 from aerial_model.values.request import MotionRequest
 from aerial_model.values.terrain import Terrain
-from aerial_planner.planner import Planner, PlanningResult, Progress
+from aerial_planner.planner import Planner
+from aerial_planner.report import PlanningResult, Progress
 from aerial_sim.conditions import Conditions
 from aerial_sim.simulation import AS_EXPECTED, Simulation
 from aerial_sim.world.placement import placed

@@ -9,8 +9,8 @@ from aerial_model.errors import RefusalCode, RefusalError
 from aerial_model.robot.robot import GRAVITY, Robot
 from aerial_model.values.request import MotionRequest
 from aerial_planner.assembly.checks import check_landing_feet
-from aerial_planner.motion.schedule import Schedule
-from aerial_planner.reference.body import Reference
+from aerial_planner.motion import Schedule
+from aerial_planner.reference import Reference
 
 _GROUND_TOLERANCE = 1e-6  # between heights that are meant to be equal [m]
 
@@ -27,10 +27,11 @@ def screen(request: MotionRequest, schedule: Schedule, reference: Reference, rob
             RefusalCode.INVALID_REQUEST,
             f"the goal is {schedule.landing_centre[2]:.2f} m high, but the ground there is {ground:.2f} m high",
         )
-    _check_stance(request, reference, robot)
+    _check_stance(request, schedule, reference, robot)
     check_landing_feet(request.terrain, _landing_feet(schedule, reference, robot), ground, robot)
-    velocity = reference.com_velocity[-1]
-    energy = robot.mass * (0.5 * float(velocity @ velocity) + GRAVITY * (reference.com[-1, 2] - reference.com[0, 2]))
+    begin, end = reference.com_velocity[0], reference.com_velocity[-1]
+    gained = 0.5 * float(end @ end) - 0.5 * float(begin @ begin)
+    energy = robot.mass * (gained + GRAVITY * (reference.com[-1, 2] - reference.com[0, 2]))
     law = robot.actuators
     # No motor gives more mechanical power than V²/4R (matched load), nor more than full torque at the speed left for it.
     matched = np.minimum(law.torque_max, 0.5 * law.bus_voltage / law.volts_per_torque)
@@ -44,17 +45,17 @@ def screen(request: MotionRequest, schedule: Schedule, reference: Reference, rob
         )
 
 
-def _check_stance(request: MotionRequest, reference: Reference, robot: Robot) -> None:
-    """Check that the standing feet stand on the ground jumped from."""
-    feet = reference.foot_position[0]
-    heights = request.terrain.height(feet)
-    for point, foot, height in zip(robot.contact_points, feet, heights, strict=True):
-        if abs(height) > _GROUND_TOLERANCE:
-            raise RefusalError(
-                RefusalCode.INVALID_REQUEST,
-                f"platform edge: foot {point.name} stands at x {foot[0]:.2f}, y {foot[1]:.2f} m, where the terrain asked for "
-                f"is {height:.2f} m high; the ground jumped from is 0 m high",
-            )
+def _check_stance(request: MotionRequest, schedule: Schedule, reference: Reference, robot: Robot) -> None:
+    """Check that every foot that bears load in the take-off does so on the ground jumped from."""
+    feet = reference.foot_position[:-1]
+    heights = np.where(schedule.contact, request.terrain.height(feet), 0.0)
+    for k, i in np.argwhere(np.abs(heights) > _GROUND_TOLERANCE)[:1]:
+        x, y, _ = feet[k, i]
+        raise RefusalError(
+            RefusalCode.INVALID_REQUEST,
+            f"platform edge: foot {robot.contact_points[i].name} stands at x {x:.2f}, y {y:.2f} m, where the terrain "
+            f"asked for is {heights[k, i]:.2f} m high; the ground jumped from is 0 m high",
+        )
 
 
 def _landing_feet(schedule: Schedule, reference: Reference, robot: Robot) -> np.ndarray:

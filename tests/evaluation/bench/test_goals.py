@@ -11,7 +11,7 @@ from aerial_evaluation.bench.subject import motions_of, usual_request
 from aerial_model.errors import RefusalError
 from aerial_model.robot.robot import Robot
 from aerial_model.values.request import MotionRequest
-from aerial_planner.motion.schedule import known_motions, motions_folder
+from aerial_planner.motion.motion import known_motions, motions_folder
 
 REACH = np.array([[-0.5, -1.0], [1.5, 1.0]])  # backward and forward ends along two axes
 

@@ -5,7 +5,7 @@ import pytest
 from aerial_evaluation.bench.samples import Sample, measure, percentiles, summary
 from aerial_model.errors import RefusalError
 from aerial_model.values.request import MotionRequest
-from aerial_planner.planner import PlanReport
+from aerial_planner.report import PlanReport
 
 TIMES = [0.1 * k for k in range(1, 22)]  # 0.1 … 2.1 s
 

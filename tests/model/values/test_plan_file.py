@@ -5,7 +5,7 @@ import pytest
 
 from aerial_model.errors import ConfigurationError, InvalidPlanError
 from aerial_model.robot.robot import Robot
-from aerial_model.values.plan import Plan
+from aerial_model.values.plan import Ending, Plan
 from aerial_model.values.plan_file import load_plan, save_plan
 from aerial_model.values.terrain import Box, Terrain
 
@@ -67,7 +67,21 @@ def test_a_file_of_another_format_is_named_as_such(plan, robot, tmp_path):
     save_plan(plan, tmp_path / "plan.npz")
     entries = {**np.load(tmp_path / "plan.npz"), "format": 99}
     np.savez(tmp_path / "plan.npz", **entries)
-    with pytest.raises(InvalidPlanError, match="format 99; this version reads 1"):
+    with pytest.raises(InvalidPlanError, match="format 99; this version reads 1 and 2"):
+        load_plan(tmp_path / "plan.npz", robot)
+
+
+def test_a_plan_of_the_first_format_ended_in_a_stand(plan, robot, tmp_path):
+    save_plan(plan, tmp_path / "plan.npz")
+    entries = {name: entry for name, entry in np.load(tmp_path / "plan.npz").items() if name != "ending"}
+    np.savez(tmp_path / "plan.npz", **{**entries, "format": 1})
+    assert load_plan(tmp_path / "plan.npz", robot).ending is Ending.STAND
+
+
+def test_an_unknown_ending_is_named(plan, robot, tmp_path):
+    save_plan(plan, tmp_path / "plan.npz")
+    np.savez(tmp_path / "plan.npz", **{**np.load(tmp_path / "plan.npz"), "ending": "handstand"})
+    with pytest.raises(InvalidPlanError, match="unknown ending 'handstand'; known: stand"):
         load_plan(tmp_path / "plan.npz", robot)
 
 

@@ -18,7 +18,7 @@ from aerial_evaluation.bench.scaling import KNOTS
 from aerial_evaluation.bench.subject import Subject, usual_request, usual_schedule
 from aerial_model.robot.robot import Robot
 from aerial_model.values.plan import Plan
-from aerial_planner.motion.schedule import load_motion
+from aerial_planner.motion.motion import load_motion
 from aerial_planner.planner import Planner
 from aerial_planner.settings import PlannerSettings
 

@@ -22,7 +22,7 @@ from aerial_evaluation.bench.violations import violations
 from aerial_model.robot.robot import Robot
 from aerial_model.values.request import LOWER_MARGIN, UPPER_MARGIN, MotionRequest
 from aerial_planner.formulation.limits import Variant
-from aerial_planner.motion.schedule import load_motion
+from aerial_planner.motion.motion import load_motion
 from aerial_planner.planner import Planner
 
 SHARE = 0.8  # of the reach along each axis within which goals are drawn

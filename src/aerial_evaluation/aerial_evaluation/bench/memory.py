@@ -11,7 +11,7 @@ import numpy as np
 from aerial_evaluation.bench.samples import Row, measure
 from aerial_evaluation.bench.subject import Subject, usual_request
 from aerial_model.values.request import MotionRequest
-from aerial_planner.motion.schedule import load_motion
+from aerial_planner.motion.motion import load_motion
 from aerial_planner.planner import Planner
 
 REQUESTS = 500

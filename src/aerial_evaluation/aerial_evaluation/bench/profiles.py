@@ -16,7 +16,7 @@ from aerial_evaluation.bench.violations import violations
 from aerial_model.robot.robot import Robot
 from aerial_model.values.plan import Plan
 from aerial_planner.formulation.limits import Variant
-from aerial_planner.planner import PlanningResult
+from aerial_planner.report import PlanningResult
 
 COLOURS = {Variant.KD: "#c44e33", Variant.AAKD_STAR: "#1f6f8b"}  # apart in grey and for the colour-blind too
 _WIDTH, _MARGIN, _HEIGHT = 2.1, 0.4, 3.8  # of one kind of joint, beside the first, and of the figure [in]

@@ -13,7 +13,8 @@ import numpy as np
 from aerial_model.errors import RefusalError
 from aerial_model.values.request import MotionRequest
 from aerial_planner.assembly.checks import ACTUATOR_TOLERANCE
-from aerial_planner.planner import Planner, PlanningResult, PlanReport
+from aerial_planner.planner import Planner
+from aerial_planner.report import PlanningResult, PlanReport
 
 Row = dict[str, Any]  # one line of a table; plain JSON types
 

@@ -13,7 +13,8 @@ from aerial_model.errors import ConfigurationError
 from aerial_model.robot.robot import Robot
 from aerial_model.values.request import MotionRequest
 from aerial_planner.formulation.limits import Variant
-from aerial_planner.motion.schedule import Schedule, contact_schedule, known_motions, load_motion
+from aerial_planner.motion.motion import known_motions, load_motion
+from aerial_planner.motion.schedule import Schedule, contact_schedule
 from aerial_planner.planner import Planner
 from aerial_planner.settings import PlannerSettings
 

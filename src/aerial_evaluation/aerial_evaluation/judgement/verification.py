@@ -90,7 +90,7 @@ def _pushed_off(robot: Robot, plan: Plan, k: int) -> tuple[np.ndarray, np.ndarra
     r, v, alpha = plan.com[0].copy(), plan.com_velocity[0].copy(), plan.angular_momentum[0].copy()
     for i in range(k):
         h = (plan.time[i + 1] - plan.time[i]) / FORCE_STEPS
-        force, feet = plan.force[i], plan.foot_position[0]
+        force, feet = plan.force[i], plan.foot_position[i]
         acceleration = force.sum(axis=0) / robot.mass + GRAVITY
         for _ in range(FORCE_STEPS):
             middle = r + 0.5 * h * v

@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 from bisect import bisect_right
 from dataclasses import dataclass, field
+from enum import StrEnum
 from functools import cached_property
 from typing import NamedTuple
 
@@ -19,12 +20,19 @@ from aerial_model.numerics import rotation
 from aerial_model.numerics.components import exp_of, inverse_of, log_of, product_of, quaternion
 from aerial_model.numerics.jit import compiled
 from aerial_model.robot.robot import BASE_ORIENTATION, BASE_POSITION, JOINT_POSITION, Robot
+from aerial_model.values.contact_sequence import ContactPhase, ContactSequence
 from aerial_model.values.frame import StartFrame
 from aerial_model.values.terrain import Terrain
 
 QUATERNION_TOLERANCE = 1e-6  # deviation of the norm from 1
 TIME_TOLERANCE = 1e-9  # [s] of a sum of time steps
 _WIDTH = 7 + 6 + 9  # of a row that is interpolated, without joints: pose and twist of the base, r, ṙ, α
+
+
+class Ending(StrEnum):
+    """What a motion ends in."""
+
+    STAND = "stand"  # the robot stands where it landed
 
 
 class Target(NamedTuple):
@@ -94,7 +102,11 @@ def sampled(track: Track, time: float) -> Target:
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """A checked trajectory over K knots; forces and contacts hold on [t_k, t_k+1)."""
+    """A checked trajectory over K knots; forces and contacts hold on [t_k, t_k+1).
+
+    The first row of q and v is the state the motion starts from, at rest or not; which points are in contact then, and
+    where they are, may differ from phase to phase of the take-off.
+    """
 
     motion: str
     robot: str
@@ -117,6 +129,7 @@ class Plan:
     rotation: np.ndarray  # (3,) accumulated rotation ∫ω dt from start to landing [rad]
     terrain: Terrain = field(default_factory=Terrain)
     request_id: str = ""
+    ending: Ending = Ending.STAND
 
     def checked(self, robot: Robot) -> Plan:
         """Return this plan if it is consistent, finite and made for ``robot``.
@@ -223,6 +236,25 @@ class Plan:
             np.array(each, dtype=float, order="C") for each in (rows, slopes, self.time, self.force)
         )
         return Track(knots, slopes, time, force, np.array(self.contact, dtype=bool, order="C"))
+
+    @cached_property
+    def contact_sequence(self) -> ContactSequence:
+        """The contacts from the start to touchdown, with footholds in the plan's frame; its last phase is the flight.
+
+        A point that bears load from one phase to the next keeps the foothold it had first.
+        """
+        held = self.contact[:-1]  # the last row holds for no time
+        begins = [0, *(np.flatnonzero(np.any(held[1:] != held[:-1], axis=1)) + 1).tolist()]
+        ends = [*begins[1:], len(held)]
+        phases: list[ContactPhase] = []
+        for begin, end in zip(begins, ends, strict=True):
+            contact, foothold = held[begin].copy(), self.foot_position[begin].copy()
+            if phases:
+                both = contact & phases[-1].contact
+                foothold[both] = phases[-1].foothold[both]
+            duration = float(self.time[end] - self.time[begin])
+            phases.append(ContactPhase(duration=duration, contact=contact, foothold=foothold))
+        return ContactSequence(phases=tuple(phases))
 
     @property
     def landing_pose(self) -> np.ndarray:

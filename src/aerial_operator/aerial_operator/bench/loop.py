@@ -20,7 +20,7 @@ from aerial_operator.live import Attempt, attempt, await_ready, keep_apart
 from aerial_operator.processes import PLANNER, PROGRAMS, SIMULATOR, NodeProcesses, parameters
 from aerial_operator.recording.recorder import TOPICS, Recorder
 from aerial_operator.recording.trial import Trial, judged
-from aerial_planner.motion.schedule import load_motion
+from aerial_planner.motion.motion import load_motion
 
 JUMPS = {"forward": (0.3, 0.0, 0.0), "back": (-0.2, 0.0, 0.0), "left": (0.0, 0.2, 0.0)}  # of motion ``jump`` [m]
 _KEPT = ("ground_truth", "controller_status", "motion_plan")  # topics that a verdict needs

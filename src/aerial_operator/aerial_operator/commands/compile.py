@@ -9,7 +9,7 @@ from aerial_model.robot.robot import Robot
 from aerial_operator.console import Report
 from aerial_operator.options.planning import compile_functions
 from aerial_planner.codegen.library import default_cache
-from aerial_planner.motion.schedule import known_motions
+from aerial_planner.motion.motion import known_motions
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

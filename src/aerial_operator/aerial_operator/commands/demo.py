@@ -141,7 +141,7 @@ def _row(motion: Mapping[str, Any]) -> list[str]:
         name,
         planned,
         "yes" if motion["landed"] else f"no: not {', '.join(failed)}",
-        ", ".join(f"{x:.2f}" for x in motion["landing_position_m"]) + " m",
+        ", ".join(f"{x:z.2f}" for x in motion["landing_position_m"]) + " m",
         f"{motion['tilt_deg']:.1f}°",
         percent(motion["peak_torque_ratio"]),
         percent(motion["peak_voltage_ratio"]),

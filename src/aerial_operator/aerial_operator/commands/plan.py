@@ -14,7 +14,7 @@ from aerial_model.values.plan_file import save_plan
 from aerial_operator.console import Report, pairs, percent, say
 from aerial_operator.options.goal import add_goal_arguments, request_from
 from aerial_operator.options.planning import add_planner_arguments, planner_choices, warm_planner
-from aerial_planner.planner import PlanReport
+from aerial_planner.report import PlanReport
 
 _STARTS = {"library": "library", "srbm": "warm", "reference": "cold"}
 
@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> Report:
 
 def summary(report: PlanReport) -> str:
     """Return the figures of a plan for a person."""
-    landing = ", ".join(f"{x:.2f}" for x in report.landing_position_m)
+    landing = ", ".join(f"{x:z.2f}" for x in report.landing_position_m)
     rotation = ", ".join(str(round(x)) for x in report.rotation_deg)
     return "\n".join(
         [

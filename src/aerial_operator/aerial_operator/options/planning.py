@@ -14,7 +14,7 @@ from aerial_model.values.request import MotionRequest
 from aerial_operator.console import say
 from aerial_planner.assembly.library import PlanLibrary
 from aerial_planner.codegen.library import default_cache
-from aerial_planner.motion.schedule import load_motion
+from aerial_planner.motion.motion import load_motion
 from aerial_planner.ocp.options import SolverName
 from aerial_planner.planner import Planner
 

@@ -14,7 +14,8 @@ from aerial_model.values.frame import StartFrame
 from aerial_model.values.plan import Plan
 from aerial_msgs.msg import ControllerStatus
 from aerial_operator.recording.recorder import Recorder
-from aerial_planner.assembly.assemble import actuator_use
+from aerial_planner.assembly.actuator_use import actuator_use
+from aerial_planner.assembly.touchdown import landing_position
 from aerial_ros.messages import from_stamp, plan_from_message
 from aerial_sim.ground_truth import GroundTruth
 from aerial_sim.ros.messages import ground_truth_from_message
@@ -131,7 +132,7 @@ def _plan_figures(plan: Plan, robot: Robot) -> dict[str, Any]:
         "take_off_time_s": plan.take_off_time,
         "flight_time_s": plan.landing_time - plan.take_off_time,
         "rotation_deg": np.degrees(plan.rotation).tolist(),
-        "landing_position_m": plan.landing_support_centre.tolist(),
+        "landing_position_m": landing_position(plan, robot).tolist(),
         "peak_torque_ratio": float(use.torque_ratio.max()),
         "peak_voltage_ratio": float(use.voltage_ratio.max()),
         "peak_speed_ratio": float(use.speed_ratio.max()),

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from aerial_model.errors import RefusalCode, RefusalError
-from aerial_model.numerics import rotation
-from aerial_model.robot.robot import BASE_ORIENTATION, JOINT_POSITION, Robot
+from aerial_model.robot.robot import JOINT_POSITION, Robot
 from aerial_model.values.plan import Plan
 from aerial_model.values.terrain import Terrain
-from aerial_planner.assembly.assemble import ActuatorUse
+from aerial_planner.assembly.actuator_use import ActuatorUse
+from aerial_planner.assembly.collision import CollisionModel
+from aerial_planner.assembly.touchdown import attitude_miss
 from aerial_planner.motion.schedule import Schedule
 from aerial_planner.ocp.problem import Solution
 
@@ -20,27 +23,65 @@ TURN_TOLERANCE = np.deg2rad(15.0)  # of the rotation accumulated about the goal'
 RANGE_TOLERANCE = np.deg2rad(3.0)  # by which a joint may leave its planning range in flight [rad]
 EDGE_MARGIN = 0.02  # of landing feet from a platform's edge [m]
 FOOT_CLEARANCE = 0.01  # of flying feet from the ground [m]
+_TOUCH_RISE = 0.02  # by which to fly higher when a link would touch the terrain [m]
+_SAME_HEIGHT = 1e-6  # by which heights that are meant to be equal differ [m]
 
 
-def check(
-    plan: Plan,
-    schedule: Schedule,
-    solution: Solution,
-    use: ActuatorUse,
-    robot: Robot,
-    actuator_tolerance: float = ACTUATOR_TOLERANCE,
-) -> None:
-    """Check a plan, most telling reason first; exact torque, voltage and speed may be so many times their limit.
+class Shortfall(NamedTuple):
+    """What a plan misses of its clearance over the terrain."""
 
-    Raises:
-        RefusalError: naming what binds.
+    height: float  # by which it should fly higher [m]; 0: feet and links clear the terrain
+    reason: str
+
+
+class PlanChecks:
+    """The checks that decide whether a plan of one robot may be handed out.
+
+    Args:
+        robot: the whole robot.
+        actuator_tolerance: exact torque, voltage or speed over its limit from which a plan is refused.
     """
-    _check_solution(solution)
-    _check_attitude(plan, schedule)
-    _check_turn(plan, schedule)
-    _check_actuators(use, plan, robot, actuator_tolerance)
-    _check_joint_range(plan, robot)
-    check_landing_feet(plan.terrain, plan.foot_position[-1], plan.landing_support_centre[2], robot)
+
+    def __init__(self, robot: Robot, actuator_tolerance: float = ACTUATOR_TOLERANCE) -> None:
+        self.robot = robot
+        self.actuator_tolerance = actuator_tolerance
+        self._collisions = CollisionModel(robot)
+
+    def check(self, plan: Plan, schedule: Schedule, solution: Solution, use: ActuatorUse) -> None:
+        """Check all of a plan but its way over the terrain, most telling reason first.
+
+        Raises:
+            RefusalError: naming what binds.
+        """
+        _check_solution(solution)
+        _check_attitude(plan, schedule)
+        _check_turn(plan, schedule)
+        _check_actuators(use, plan, self.robot, self.actuator_tolerance)
+        _check_joint_range(plan, self.robot)
+        check_landing_feet(plan.terrain, plan.foot_position[-1], plan.landing_support_centre[2], self.robot)
+
+    def passes(self, plan: Plan, schedule: Schedule, solution: Solution, use: ActuatorUse) -> bool:
+        """Return whether a plan passes ``check``."""
+        try:
+            self.check(plan, schedule, solution, use)
+        except RefusalError:
+            return False
+        return True
+
+    def shortfall(self, plan: Plan) -> Shortfall:
+        """Return by how much a plan should fly higher over the terrain, and why.
+
+        Raises:
+            RefusalError: if links touch where more height does not help.
+        """
+        deficit = clearance_deficit(plan, self.robot)
+        touch = self._collisions.first_touch(plan)
+        if touch is None:
+            return Shortfall(deficit, f"a foot would pass {100 * deficit:.1f} cm too low")
+        if touch.is_terrain and plan.take_off_time < touch.time < plan.landing_time:
+            return Shortfall(max(deficit, _TOUCH_RISE), str(touch))
+        what = "platform edge" if touch.is_terrain else "self-collision"
+        raise _refuse(f"{what}: {touch}")
 
 
 def clearance_deficit(plan: Plan, robot: Robot) -> float:
@@ -56,8 +97,8 @@ def clearance_deficit(plan: Plan, robot: Robot) -> float:
     gap = feet[..., 2] - radii - ground
     share = (time - plan.take_off_time) / flight
     start = plan.terrain.height(plan.foot_position[0])
-    leaving = (share[:, None] < 0.1) & (ground <= start + 1e-6)
-    meeting = (share[:, None] > 0.9) & (np.abs(ground - plan.landing_support_centre[2]) < 1e-6)
+    leaving = (share[:, None] < 0.1) & (ground <= start + _SAME_HEIGHT)
+    meeting = (share[:, None] > 0.9) & (np.abs(ground - plan.landing_support_centre[2]) < _SAME_HEIGHT)
     wanted = np.where(leaving | meeting, -FOOT_CLEARANCE, FOOT_CLEARANCE)
     return float(max(0.0, np.max(wanted - gap, initial=0.0)))
 
@@ -73,12 +114,6 @@ def _check_solution(solution: Solution) -> None:
             f"no take-off within the limits was found in {solution.iterations} iterations (largest constraint violation "
             f"{solution.max_violation:.2g}); what binds: {', '.join(solution.binding[:3]) or 'nothing in particular'}",
         )
-
-
-def attitude_miss(plan: Plan, schedule: Schedule) -> np.ndarray:
-    """Return by what rotation vector ``(3,)`` [rad], in the base at the goal, the finely integrated landing is off."""
-    landed = rotation.multiply(rotation.conjugate(schedule.landing_orientation), plan.q[-1, BASE_ORIENTATION])
-    return rotation.log(landed)
 
 
 def _check_attitude(plan: Plan, schedule: Schedule) -> None:
@@ -126,7 +161,7 @@ def check_landing_feet(terrain: Terrain, feet: np.ndarray, surface: float, robot
     for point, foot in zip(robot.contact_points, feet, strict=True):
         offsets = EDGE_MARGIN * np.array([[0, 0], [1, 1], [1, -1], [-1, 1], [-1, -1]])
         ground = terrain.height(foot[:2] + offsets)
-        if np.any(np.abs(ground - surface) > 1e-6):
+        if np.any(np.abs(ground - surface) > _SAME_HEIGHT):
             raise _refuse(
                 f"platform edge: foot {point.name} would land at x {foot[0]:.2f}, y {foot[1]:.2f} m, where the ground is "
                 f"{ground[np.argmax(np.abs(ground - surface))]:.2f} m high within {EDGE_MARGIN} m of an edge; the landing surface is {surface:.2f} m high"

@@ -12,7 +12,7 @@ from aerial_model.numerics.components import matrix_of, product_of, quaternion
 from aerial_model.numerics.jit import compiled
 from aerial_model.numerics.rotation import IDENTITY
 from aerial_planner.kinematics.base_frame import BaseFrameModel
-from aerial_planner.reference.body import FlightPath
+from aerial_planner.reference.flight_path import FlightPath
 
 _STEP = 0.005  # of the fourth-order integration [s]
 
@@ -28,17 +28,31 @@ class Flight:
     joint_velocity: np.ndarray  # (K, n) [rad/s]
 
 
+@dataclass(frozen=True, kw_only=True)
+class LiftOff:
+    """The state from which a flight begins, in S."""
+
+    orientation: np.ndarray  # (4,) of the base
+    angular_momentum: np.ndarray  # (3,) α [kg·m²/s]
+    joint_position: np.ndarray  # (n,) [rad]
+    joint_velocity: np.ndarray  # (n,) [rad/s]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmCourse:
+    """Where the joints that are free in flight go."""
+
+    joints: np.ndarray  # (n_a,) their indices
+    position: np.ndarray  # (M+1, n_a) at evenly spaced knots from take-off to touchdown [rad]
+
+
 def integrate_flight(
     model: BaseFrameModel,
     path: FlightPath,
+    lift_off: LiftOff,
+    arms: ArmCourse,
     *,
     duration: float,
-    orientation: np.ndarray,
-    angular_momentum: np.ndarray,
-    joint_position: np.ndarray,
-    joint_velocity: np.ndarray,
-    arms: np.ndarray,
-    arm_position: np.ndarray,
     step: float = _STEP,
 ) -> Flight:
     """Return the flight from a take-off state, by the classical Runge–Kutta rule on the quaternion.
@@ -49,28 +63,27 @@ def integrate_flight(
     Args:
         model: the robot's base-frame functions.
         path: the legs' path.
+        lift_off: where the flight begins.
+        arms: joints that do not follow the path.
         duration: of the flight [s].
-        orientation: of the base at take-off ``(4,)``.
-        angular_momentum: α ``(3,)`` in S [kg·m²/s].
-        joint_position: at take-off ``(n,)`` [rad].
-        joint_velocity: at take-off ``(n,)`` [rad/s].
-        arms: indices of the joints that are free in flight ``(n_a,)``.
-        arm_position: their positions at evenly spaced knots from take-off to touchdown ``(M+1, n_a)`` [rad].
         step: of the integration and of the returned samples [s], shortened so that it divides the flight.
     """
     n = max(1, round(duration / step))
     h = duration / n
     half_times = np.linspace(0.0, duration, 2 * n + 1)
-    q_j, dq_j = path.from_take_off(joint_position, joint_velocity, half_times, duration)
-    if len(arms) > 0:
-        dt = duration / (len(arm_position) - 1)
-        rates = np.diff(arm_position, axis=0) / dt
+    q_j, dq_j = path.from_take_off(lift_off.joint_position, lift_off.joint_velocity, half_times, duration)
+    if len(arms.joints) > 0:
+        start, rate = lift_off.joint_position[arms.joints], lift_off.joint_velocity[arms.joints]
+        dt = duration / (len(arms.position) - 1)
+        rates = np.diff(arms.position, axis=0) / dt
         times = np.concatenate([[0.0], (np.arange(len(rates)) + 0.5) * dt, [duration]])
-        course = make_interp_spline(times, np.vstack([joint_velocity[arms], rates, rates[-1:]]), k=1)
-        dq_j[:, arms] = course(half_times)
-        q_j[:, arms] = joint_position[arms] + course.antiderivative()(half_times)
+        course = make_interp_spline(times, np.vstack([rate, rates, rates[-1:]]), k=1)
+        dq_j[:, arms.joints] = course(half_times)
+        q_j[:, arms.joints] = start + course.antiderivative()(half_times)
     inertia, legs_momentum = model.momenta(q_j, dq_j)
-    attitude, omega = _turned(h, np.linalg.inv(inertia), legs_momentum, angular_momentum.copy(), orientation.copy())
+    attitude, omega = _turned(
+        h, np.linalg.inv(inertia), legs_momentum, lift_off.angular_momentum.copy(), lift_off.orientation.copy()
+    )
     return Flight(
         time=half_times[::2],
         orientation=attitude,
@@ -89,7 +102,7 @@ def rehearse() -> None:
 @compiled
 def _turned(
     h: float, inertia_inverse: np.ndarray, legs_momentum: np.ndarray, alpha: np.ndarray, orientation: np.ndarray
-) -> tuple:
+) -> tuple[np.ndarray, np.ndarray]:
     """Return attitudes ``(n+1, 4)`` and body rates ``(n+1, 3)`` at every other one of 2 n + 1 times half a step apart."""
     n = len(legs_momentum) // 2
     attitude, omega = np.empty((n + 1, 4)), np.empty((n + 1, 3))

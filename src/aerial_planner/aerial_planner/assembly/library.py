@@ -17,12 +17,13 @@ import numpy as np
 
 from aerial_model.errors import AerialError, ConfigurationError, InvalidPlanError
 from aerial_model.numerics import rotation
-from aerial_model.robot.robot import BASE_ANGULAR, BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY, Robot
+from aerial_model.robot.robot import BASE_ANGULAR, BASE_ORIENTATION, GRAVITY, JOINT_POSITION, JOINT_VELOCITY, Robot
 from aerial_model.values.plan import Plan
 from aerial_model.values.plan_file import load_plan, save_plan
 from aerial_planner.formulation.trajectory import TakeOffTrajectory
 from aerial_planner.motion.schedule import Schedule
-from aerial_planner.reference.body import FlightPath, Reference
+from aerial_planner.reference.body import Reference
+from aerial_planner.reference.flight_path import FlightPath
 
 _NEAR = 1.5  # distance up to which a stored plan is the better start, see decision 8
 _SPACING = 0.1  # distance to a stored plan below which another one adds nothing
@@ -36,7 +37,7 @@ class _Entry:
 
     plan: Plan
     n_knots: int  # N of its take-off
-    place: np.ndarray  # (6 + n_p,), see ``_place``
+    place: np.ndarray  # (9 + n_p,), see ``_place``
 
     @property
     def contacts(self) -> bytes:
@@ -73,7 +74,7 @@ class PlanLibrary:
         """Return the take-off of the nearest plan with this contact schedule; None if there is none near."""
         entries = self._entries.get(schedule.contact.tobytes(), [])
         height, start = reference.landing_com_height, reference.joint_position[0]
-        place = _place(schedule.landing_centre, schedule.rotation, start, height)
+        place = _place(schedule.landing_centre, schedule.rotation, start, reference.com_velocity[0], height)
         distances = [float(np.linalg.norm(entry.place - place)) for entry in entries]
         if not distances or min(distances) > _NEAR:
             return None
@@ -105,7 +106,8 @@ class PlanLibrary:
         if abs(plan.time[N] - plan.take_off_time) > _SAME_TIME or plan.contact[N:].any():
             raise InvalidPlanError(f"plan of {plan.motion}: expected a knot at take_off_time and no contact after it")
         start = plan.start_joint_position[self._joints]
-        place = _place(plan.landing_support_centre, plan.rotation, start, plan.landing_com_height)
+        goal, velocity = plan.landing_support_centre, plan.com_velocity[0]
+        place = _place(goal, plan.rotation, start, velocity, plan.landing_com_height)
         return _Entry(plan=plan, n_knots=N, place=place)
 
     def _write(self, entry: _Entry) -> None:
@@ -133,9 +135,9 @@ def _files(folder: Path) -> list[Path]:
         raise ConfigurationError(f"plan library {folder}: cannot be read ({error.strerror})") from None
 
 
-def _place(landing: np.ndarray, turn: np.ndarray, start: np.ndarray, height: float) -> np.ndarray:
-    """Return goal and start as a point ``(6 + n_p,)`` in a space where 1 is far: standing heights and radians."""
-    return np.concatenate([landing / height, turn, start])
+def _place(landing: np.ndarray, turn: np.ndarray, start: np.ndarray, velocity: np.ndarray, height: float) -> np.ndarray:
+    """Return goal and start as a point ``(9 + n_p,)`` in a space where 1 is far: standing heights, radians, √(g h)."""
+    return np.concatenate([landing / height, turn, start, velocity / np.sqrt(GRAVITY * height)])
 
 
 def _take_off(plan: Plan, N: int, path: FlightPath, joints: np.ndarray) -> TakeOffTrajectory:

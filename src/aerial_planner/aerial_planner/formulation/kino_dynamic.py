@@ -12,7 +12,8 @@ from aerial_planner.formulation.trajectory import TakeOffTrajectory
 from aerial_planner.motion.schedule import Schedule
 from aerial_planner.ocp.problem import Solution
 from aerial_planner.ocp.stage import StageData
-from aerial_planner.reference.body import FlightPath, Reference
+from aerial_planner.reference.body import Reference
+from aerial_planner.reference.flight_path import FlightPath
 
 
 class KinoDynamic(KinoDynamicKinds):

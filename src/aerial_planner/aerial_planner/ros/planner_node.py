@@ -5,6 +5,7 @@ Every selection gets an answer, whatever it holds, and nothing it holds ends the
 
 from __future__ import annotations
 
+import threading
 import time
 from functools import partial
 from pathlib import Path
@@ -24,9 +25,10 @@ from aerial_msgs.action import PlanMotion
 from aerial_msgs.msg import MotionPlan, MotionResult, MotionSelection
 from aerial_planner.assembly.library import PlanLibrary
 from aerial_planner.codegen.library import default_cache
-from aerial_planner.motion.schedule import known_motions
+from aerial_planner.motion.motion import known_motions
 from aerial_planner.ocp.options import SolverName
 from aerial_planner.planner import Planner
+from aerial_planner.ros.unanswered import UnansweredPlan
 from aerial_planner.ros.worker import Worker
 from aerial_ros import node, qos
 from aerial_ros.messages import (
@@ -74,14 +76,14 @@ class PlannerNode(node.AerialNode):
         self._active = False
         self._odometry: Odometry | None = None
         self._joints: JointState | None = None
-        self._counts = {"planned": 0, "refused": 0}
+        self._counts = {"planned": 0, "refused": 0}  # by the planning thread, or by the node's if it is busy
+        self._counting = threading.Lock()
         self._plans = self.create_lifecycle_publisher(MotionPlan, "motion_plan", qos.EVENT)
         self._results = self.create_lifecycle_publisher(MotionResult, "motion_result", qos.ANSWER)
-        self._unanswered: MotionPlan | None = None  # the last plan, until a controller says what becomes of it
-        self._repeat_until = 0.0  # monotonic [s]
+        self._unanswered = UnansweredPlan()
         self._repeater = self.create_timer(REPEAT_PERIOD, self._repeat)
         self._inputs = [
-            self.create_subscription(MotionResult, "motion_result", self._on_result, qos.EVENT),
+            self.create_subscription(MotionResult, "motion_result", self._unanswered.answered, qos.EVENT),
             self.create_subscription(MotionSelection, "motion_selection", self._on_selection, qos.EVENT),
             self.create_subscription(Odometry, "odometry", partial(setattr, self, "_odometry"), qos.TELEMETRY),
             self.create_subscription(JointState, "joint_states", partial(setattr, self, "_joints"), qos.TELEMETRY),
@@ -120,7 +122,8 @@ class PlannerNode(node.AerialNode):
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         """Return what the planner is at, and what it did so far."""
-        figures = {"robot": self._robot.name, "model_hash": self._robot.model_hash, **self._counts}
+        with self._counting:
+            figures = {"robot": self._robot.name, "model_hash": self._robot.model_hash, **self._counts}
         return DiagnosticStatus.OK, self._worker.activity, figures
 
     def _on_selection(self, selection: MotionSelection) -> None:
@@ -156,22 +159,19 @@ class PlannerNode(node.AerialNode):
     def _plan(self, selection: MotionSelection, start: Estimate | None) -> None:
         result = self._planner.plan(selection_from_message(selection), start)
         self._answer(selection, MotionResult.PLANNED)
-        self._unanswered, self._repeat_until = plan_to_message(result.plan, self._robot), time.monotonic() + REPEAT_TIME
-        self._plans.publish(self._unanswered)
-
-    def _on_result(self, result: MotionResult) -> None:
-        plan = self._unanswered
-        if plan is not None and result.request_id == plan.request_id and result.outcome != MotionResult.PLANNED:
-            self._unanswered = None
+        message = plan_to_message(result.plan, self._robot)
+        self._unanswered.put(message, time.monotonic() + REPEAT_TIME)
+        self._plans.publish(message)
 
     def _repeat(self) -> None:
         """Publish the last plan again while no controller has answered it: it may not have been found when it came."""
-        plan = self._unanswered
-        if plan is not None and self._active and time.monotonic() < self._repeat_until:
+        plan = self._unanswered.at(time.monotonic())
+        if plan is not None and self._active:
             self._plans.publish(plan)
 
     def _answer(self, selection: MotionSelection, outcome: int, refusal: RefusalError | None = None) -> None:
-        self._counts["planned" if refusal is None else "refused"] += 1
+        with self._counting:
+            self._counts["planned" if refusal is None else "refused"] += 1
         stamp = self.get_clock().now().to_msg()
         self._results.publish(result_to_message(selection.request_id, selection.motion, outcome, stamp, refusal))
 

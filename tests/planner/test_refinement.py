@@ -9,7 +9,8 @@ import pytest
 from aerial_planner.formulation.limits import Margin, Variant
 from aerial_planner.kinematics.base_frame import base_frame_model
 from aerial_planner.kinematics.inverse_kinematics import InverseKinematics
-from aerial_planner.motion.schedule import contact_schedule, load_motion
+from aerial_planner.motion.motion import load_motion
+from aerial_planner.motion.schedule import contact_schedule
 from aerial_planner.motion.start import Start
 from aerial_planner.reference.body import body_reference
 from aerial_planner.refinement import Attempt, Outcome

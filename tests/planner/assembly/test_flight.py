@@ -6,9 +6,9 @@ import pytest
 
 from aerial_model.numerics import rotation
 from aerial_model.robot.robot import Robot
-from aerial_planner.assembly.flight import integrate_flight
+from aerial_planner.assembly.flight import ArmCourse, LiftOff, integrate_flight
 from aerial_planner.kinematics.base_frame import base_frame_model
-from aerial_planner.reference.body import FlightPath
+from aerial_planner.reference.flight_path import FlightPath
 
 T = 0.4  # [s]
 
@@ -34,13 +34,14 @@ def fly(robot, model, alpha, *, tuck="tuck", step=0.005, rate=0.0):
     return integrate_flight(
         model,
         path(robot, tuck),
+        LiftOff(
+            orientation=rotation.exp(np.array([0.1, -0.2, 0.3])),
+            angular_momentum=np.array(alpha),
+            joint_position=robot.poses["home"],
+            joint_velocity=np.full(12, rate),
+        ),
+        ArmCourse(joints=robot.arms, position=np.zeros((17, 0))),
         duration=T,
-        orientation=rotation.exp(np.array([0.1, -0.2, 0.3])),
-        angular_momentum=np.array(alpha),
-        joint_position=robot.poses["home"],
-        joint_velocity=np.full(12, rate),
-        arms=robot.arms,
-        arm_position=np.zeros((17, 0)),
         step=step,
     )
 
@@ -87,13 +88,14 @@ def test_arms_go_through_their_knots_from_the_rates_they_leave_the_ground_with()
     flight = integrate_flight(
         base_frame_model(robot),
         path(robot),
+        LiftOff(
+            orientation=rotation.IDENTITY,
+            angular_momentum=np.zeros(3),
+            joint_position=robot.poses["home"],
+            joint_velocity=rates,
+        ),
+        ArmCourse(joints=arms, position=knots),
         duration=T,
-        orientation=rotation.IDENTITY,
-        angular_momentum=np.zeros(3),
-        joint_position=robot.poses["home"],
-        joint_velocity=rates,
-        arms=arms,
-        arm_position=knots,
     )
     np.testing.assert_allclose(flight.joint_velocity[0, arms], 2.0)
     np.testing.assert_allclose(flight.joint_position[0, arms], knots[0])

@@ -10,7 +10,7 @@ from aerial_model.values.plan_file import load_plan, save_plan
 from aerial_model.values.request import MotionRequest
 from aerial_planner.assembly.library import PlanLibrary
 
-from .conftest import jump
+from ..conftest import jump
 
 POSITION_TOLERANCE = 1e-3  # [m] between optima found from different starts
 

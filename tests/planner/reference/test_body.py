@@ -1,4 +1,4 @@
-"""How the legs are to meet the ground, of robots whose legs and rotors weigh little and of one whose do not."""
+"""The reference of a motion: where body, feet and legs should roughly be, of light-legged robots and of one that is not."""
 
 import dataclasses
 
@@ -10,10 +10,13 @@ from aerial_model.robot.robot import Robot
 from aerial_model.values.request import MotionRequest
 from aerial_planner.kinematics.base_frame import base_frame_model
 from aerial_planner.kinematics.inverse_kinematics import InverseKinematics
-from aerial_planner.motion.schedule import contact_schedule, load_motion
+from aerial_planner.motion.motion import load_motion
+from aerial_planner.motion.schedule import contact_schedule
 from aerial_planner.motion.start import Start
 from aerial_planner.reference.body import body_reference
 from aerial_planner.settings import PlannerSettings
+
+from ..trot import moving, pair, sequence
 
 GOALS = [(0.0, 0.0, 0.0), (0.52, 0.0, 0.0), (0.0, 0.3, 0.0), (-0.2, 0.0, 0.0)]
 
@@ -176,3 +179,55 @@ def test_the_path_at_its_knots_is_what_the_problem_has(a_robot):
         _, fraction, *pose = path.parameters(k)
         q = q + fraction * (np.array(pose) - q)
         np.testing.assert_allclose(q, expected, atol=1e-9)
+
+
+@pytest.fixture(scope="module")
+def from_a_trot(robot):
+    """Schedule and reference of a take-off on one diagonal pair, then on the other 0.3 m ahead."""
+    first, second = pair(robot, "fr", "hl"), pair(robot, "fl", "hr")
+    estimate = moving(robot, 0.8, first)
+    start = Start.moving(robot, estimate, sequence(robot, estimate.q, (0.12, first, 0.0), (0.14, second, 0.3)))
+    settings, model = robot.section("planner", PlannerSettings), base_frame_model(robot)
+    schedule = contact_schedule(
+        MotionRequest(motion="jump", displacement=np.array([0.7, 0.0, 0.0])),
+        load_motion("jump", robot),
+        robot,
+        settings.dt,
+        settings.flight_knots,
+        sequence=start.sequence,
+    )
+    ik = InverseKinematics(robot, model)
+    return start, schedule, body_reference(schedule, start, robot, model, ik, settings)
+
+
+def test_the_body_path_begins_with_the_state_of_the_start(from_a_trot, robot):
+    start, _, reference = from_a_trot
+    data = robot.model.createData()
+    momentum = pin.computeCentroidalMomentum(robot.model, data, start.q, start.v)
+    np.testing.assert_allclose(reference.com[0], data.com[0], atol=1e-9)
+    np.testing.assert_allclose(reference.com_velocity[0], momentum.linear / robot.mass, atol=1e-12)
+    np.testing.assert_allclose(reference.x_0[3:9], [*momentum.linear / robot.mass, *momentum.angular], atol=1e-12)
+    np.testing.assert_array_equal(reference.start_joint_velocity, start.v[6:])
+
+
+def test_the_body_path_is_the_integral_of_its_velocity(from_a_trot):
+    _, schedule, reference = from_a_trot
+    moved = np.diff(reference.com, axis=0) / schedule.dt
+    mean = (reference.com_velocity[1:] + reference.com_velocity[:-1]) / 2
+    np.testing.assert_allclose(moved, mean, atol=0.02)
+
+
+def test_feet_stand_on_their_footholds_while_they_bear_load(from_a_trot):
+    _, schedule, reference = from_a_trot
+    for ends in (reference.foot_position[:-1], reference.foot_position[1:]):
+        np.testing.assert_allclose(ends[schedule.contact], schedule.foothold[schedule.contact], atol=1e-12)
+
+
+def test_feet_rise_while_they_are_in_the_air_and_sink_to_their_footholds(from_a_trot, robot):
+    _, schedule, reference = from_a_trot
+    clearance, landing = reference.foot_clearance, np.flatnonzero(~schedule.contact[0])
+    lands = int(np.argmax(schedule.contact[:, landing[0]]))
+    swing = clearance[: lands + 1, landing[0]]
+    np.testing.assert_allclose(swing, swing[::-1])
+    assert swing.max() == robot.section("planner", PlannerSettings).swing_clearance
+    assert np.all(clearance[:-1][schedule.contact] == 0.0)

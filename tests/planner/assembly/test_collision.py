@@ -8,7 +8,7 @@ from aerial_model.robot.robot import BASE_POSITION, JOINT_POSITION
 from aerial_model.values.terrain import Terrain
 from aerial_planner.assembly.collision import CollisionModel
 
-from .conftest import jump
+from ..conftest import jump
 
 PLATFORM = Terrain.platform(0.16, 0.3, 0.0)
 
