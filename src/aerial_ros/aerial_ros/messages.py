@@ -18,7 +18,7 @@ from sensor_msgs.msg import JointState
 from aerial_model.errors import ConfigurationError, InvalidPlanError, RefusalCode, RefusalError
 from aerial_model.robot.robot import Robot
 from aerial_model.values.estimate import Estimate
-from aerial_model.values.plan import Plan
+from aerial_model.values.plan import Ending, Plan
 from aerial_model.values.request import MotionRequest
 from aerial_model.values.terrain import BOXES_MAX, Box, Terrain
 from aerial_msgs.msg import MotionPlan, MotionResult, MotionSelection, TerrainBox
@@ -32,6 +32,7 @@ _PLAN_CONTACT_ROWS = ("foot_position", "force")
 _PLAN_NUMBERS = ("take_off_time", "landing_time", "landing_com_height", "landing_yaw")
 _PLAN_VECTORS = ("landing_support_centre", "rotation")
 
+_ENDINGS = {getattr(MotionPlan, ending.name): ending for ending in Ending}
 _CODES = {getattr(MotionResult, code.name): code for code in RefusalCode}
 _OUTCOMES = {
     getattr(MotionResult, name): name.lower()
@@ -175,6 +176,7 @@ def plan_to_message(plan: Plan, robot: Robot) -> MotionPlan:
         contact=plan.contact.ravel().tolist(),
         landing_joint_position=doubles(plan.landing_joint_position),
         terrain=terrain_to_message(plan.terrain),
+        ending=getattr(MotionPlan, plan.ending.name),
         **{name: getattr(plan, name) for name in _PLAN_TEXTS},
         **{name: doubles(getattr(plan, name)) for name in ("time", *_PLAN_ROWS, *_PLAN_CONTACT_ROWS)},
         **{name: float(getattr(plan, name)) for name in _PLAN_NUMBERS},
@@ -197,10 +199,14 @@ def plan_from_message(message: MotionPlan, robot: Robot) -> Plan:
         terrain = terrain_from_message(message.terrain)
     except ConfigurationError as error:
         raise InvalidPlanError(f"plan field terrain: {error}") from None
+    if message.ending not in _ENDINGS:
+        known = ", ".join(f"{number} ({ending})" for number, ending in _ENDINGS.items())
+        raise InvalidPlanError(f"plan field ending: unknown ending {message.ending}; known: {known}")
     plan = Plan(
         contact=_rows(message, "contact", -1).astype(bool),
         landing_joint_position=np.array(message.landing_joint_position),
         terrain=terrain,
+        ending=_ENDINGS[message.ending],
         time=_rows(message, "time"),
         **{name: _rows(message, name, -1) for name in _PLAN_ROWS},
         **{name: _rows(message, name, -1, 3) for name in _PLAN_CONTACT_ROWS},
