@@ -180,7 +180,7 @@ class Planner:
 
         Args:
             requests: one of each contact schedule and variant.
-            progress: told the name of each before it is compiled.
+            progress: called with the name of each before it is compiled.
 
         Raises:
             CompilationError: if there is no C compiler, or it fails.

@@ -83,7 +83,7 @@ class Stages:
 
         Args:
             cases: a request of each contact schedule and variant, and its schedule.
-            progress: told the name of each before it is compiled.
+            progress: called with the name of each before it is compiled.
 
         Raises:
             CompilationError: if there is no C compiler, or it fails.

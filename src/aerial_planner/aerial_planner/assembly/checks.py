@@ -48,7 +48,7 @@ class PlanChecks:
         self._collisions = CollisionModel(robot)
 
     def check(self, plan: Plan, schedule: Schedule, solution: Solution, use: ActuatorUse) -> None:
-        """Check all of a plan but its way over the terrain, most telling reason first.
+        """Check a plan but for its clearance over the terrain, most telling reason first.
 
         Raises:
             RefusalError: naming what binds.

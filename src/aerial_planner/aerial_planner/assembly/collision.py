@@ -1,4 +1,4 @@
-"""Does any link touch the terrain or another link on the way? Checked after the optimization, as in the thesis.
+"""The first touch of a link with the terrain or another link along a plan, checked after the optimization, as in the thesis.
 
 The shapes are the URDF's collision geometry, by coal through Pinocchio. Contact points and the shapes they stand for are
 left out: they are meant to touch, and their clearance is a number of its own (see ``checks``).

@@ -50,7 +50,7 @@ class PlanLibrary:
     Args:
         folder: made when the first plan is added; files that ``aerial plan --out`` wrote may be put there.
         robot: whose plans count.
-        warn: told which files are skipped, and which plans could not be kept.
+        warn: called with a sentence about each file that is skipped and each plan that could not be kept.
 
     Raises:
         ConfigurationError: if ``folder`` is no folder, or cannot be read.
@@ -82,7 +82,7 @@ class PlanLibrary:
         return _take_off(entry.plan, entry.n_knots, reference.flight_path, self._joints)
 
     def add(self, plan: Plan) -> None:
-        """Keep a plan, on disk too, unless nearly the same one is there; a disk that fails is told, not raised."""
+        """Keep a plan, on disk too, unless nearly the same one is there; a disk that fails is a warning, not an error."""
         entry = self._entry(plan)
         others = self._entries.get(entry.contacts, [])
         if any(np.linalg.norm(entry.place - other.place) < _SPACING for other in others):

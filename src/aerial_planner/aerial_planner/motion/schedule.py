@@ -53,7 +53,7 @@ class Schedule:
 
     @property
     def aim(self) -> np.ndarray:
-        """Attitude ``(4,)`` that the optimizer is told: the landing's, corrected by what its coarse flight misses."""
+        """Attitude ``(4,)`` given to the optimizer as goal: the landing's, corrected by what its coarse flight misses."""
         return rotation.multiply(self.landing_orientation, rotation.exp(self.correction))
 
     @property
