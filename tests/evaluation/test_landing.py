@@ -7,11 +7,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from aerial_evaluation.judgement.landing import OBSERVE_TIME, Tick, judge
+from aerial_evaluation.judgement.landing import OBSERVE_TIME, judge
+from aerial_evaluation.record import IncompleteRunError, Run, Tick
 from aerial_model.numerics import rotation
 from aerial_model.robot.robot import BASE_ORIENTATION, Robot
 from aerial_model.values.frame import StartFrame
 from aerial_model.values.plan import Plan
+from aerial_sim.conditions import Conditions
 from aerial_sim.ground_truth import GroundTruth
 
 DT = 0.002  # [s]
@@ -19,6 +21,7 @@ START = 3.0  # [s]
 TAKE_OFF, LANDING = 0.3, 0.6  # [s] from the start
 ORIGIN = np.array([0.5, -0.2, 0.1])  # [m]
 HEADING = 0.7  # [rad]
+FRAME = StartFrame(origin=ORIGIN, heading=HEADING)
 JUMP = np.array([0.3, 0.0, 0.0])  # [m]
 TURN = 0.4  # [rad] about z
 TWIST = TURN / LANDING  # [rad/s]
@@ -64,7 +67,7 @@ def plan(robot):
 @pytest.fixture
 def ticks(robot, plan):
     """A history that does exactly what the plan says, then stands."""
-    placed = plan.placed(StartFrame(origin=ORIGIN, heading=HEADING))
+    placed = plan.placed(FRAME)
     n_c, n = robot.n_contacts, robot.n_joints
     history = []
     for t in np.arange(round((LANDING + OBSERVE_TIME) / DT) + 1) * DT:
@@ -93,8 +96,8 @@ def ticks(robot, plan):
 
 @pytest.fixture
 def verdict(robot, plan):
-    def verdict(ticks, plan=plan):
-        return judge(robot, plan, frame=StartFrame(origin=ORIGIN, heading=HEADING), start_time=START, ticks=ticks)
+    def verdict(ticks, plan=plan, frame=FRAME):
+        return judge(Run(robot=robot, plan=plan, start_frame=frame, start_time=START, ticks=ticks))
 
     return verdict
 
@@ -249,11 +252,21 @@ def test_what_happens_before_or_after_does_not_count(verdict, ticks):
 
 
 def test_a_history_that_ends_early_is_no_verdict(verdict, ticks):
-    with pytest.raises(ValueError, match="cover"):
+    with pytest.raises(IncompleteRunError, match=r"judged from 3.000 s to 5.100 s; the true states cover 3.000 s to"):
         verdict(ticks[:-10])
+    with pytest.raises(IncompleteRunError, match="no true states"):
+        verdict([])
 
 
-def test_the_start_heading_frame_is_the_robots_not_the_worlds(robot, plan, ticks):
-    """The same history judged from another heading is off in place."""
-    result = judge(robot, plan, frame=StartFrame(origin=ORIGIN, heading=HEADING + 1.0), start_time=START, ticks=ticks)
+def test_the_start_heading_frame_is_the_robots_not_the_worlds(verdict, ticks):
+    """A perfect history judged from another heading is off in place."""
+    result = verdict(ticks, frame=StartFrame(origin=ORIGIN, heading=HEADING + 1.0))
     assert result.failed == ("position",)
+
+
+def test_ground_that_rose_counts_for_the_height(robot, plan, ticks):
+    """What stands 0.06 m higher than planned has not landed, unless the ground is where it stands."""
+    q = ticks[-1].truth.q + np.eye(19)[2] * 0.06
+    history = {"robot": robot, "plan": plan, "start_frame": FRAME, "start_time": START, "ticks": moved(ticks, q=q)}
+    assert judge(Run(**history)).failed == ("height",)
+    assert judge(Run(**history, conditions=Conditions(ground_rise=0.06))).landed

@@ -6,8 +6,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from aerial_evaluation.judgement.landing import Tick
 from aerial_evaluation.judgement.tracking import FIGURES, PHASES, SAMPLES, sampled, summary
+from aerial_evaluation.record import Run, Tick
 from aerial_model.numerics import rotation
 from aerial_model.robot.robot import BASE_ANGULAR, BASE_ORIENTATION, BASE_POSITION, Robot
 from aerial_model.values.frame import StartFrame
@@ -16,7 +16,8 @@ from aerial_planner.planner import Planner
 from aerial_sim.ground_truth import GroundTruth
 
 ORIGIN, HEADING, START = np.array([1.0, -2.0, 0.0]), 0.7, 3.0
-PERIOD = 0.002
+FRAME = StartFrame(origin=ORIGIN, heading=HEADING)
+PERIOD = 0.002  # [s]
 SHIFT, TURN = np.array([0.01, -0.02, 0.02]), np.array([0.0, 0.05, 0.0])
 
 
@@ -32,7 +33,7 @@ def plan(robot):
 
 def followed(robot, plan, change=lambda q, v: (q, v)):
     """The figures of a run that follows a plan but for a change of its state."""
-    placed, n, n_c = plan.placed(StartFrame(origin=ORIGIN, heading=HEADING)), robot.n_joints, robot.n_contacts
+    placed, n, n_c = plan.placed(FRAME), robot.n_joints, robot.n_contacts
     ticks = []
     for time in np.arange(-0.1, plan.landing_time + 1.0, PERIOD):
         wanted = placed.sample(time)
@@ -40,7 +41,7 @@ def followed(robot, plan, change=lambda q, v: (q, v)):
         nothing = (np.zeros(n_c, dtype=bool), np.zeros((n_c, 3)), (), False, np.zeros(n), np.zeros(n), 0.0, 0.0)
         names = [f.name for f in dataclasses.fields(GroundTruth)]
         ticks.append(Tick(truth=GroundTruth(**dict(zip(names, (START + time, q, v, *nothing), strict=True)))))
-    return sampled(robot, plan, frame=StartFrame(origin=ORIGIN, heading=HEADING), start_time=START, ticks=ticks)
+    return sampled(Run(robot=robot, plan=plan, start_frame=FRAME, start_time=START, ticks=ticks))
 
 
 def test_who_does_as_planned_is_off_by_nothing_until_touchdown(robot, plan):
@@ -82,12 +83,12 @@ def test_after_landing_all_turning_is_too_much(robot, plan):
 
 
 def test_a_run_that_ends_before_a_phase_has_no_figures_of_it(robot, plan):
-    ticks = []
-    assert sampled(robot, plan, frame=StartFrame(origin=ORIGIN, heading=HEADING), start_time=START, ticks=ticks) == {}
+    assert sampled(Run(robot=robot, plan=plan, start_frame=FRAME, start_time=START, ticks=[])) == {}
 
 
 def test_many_runs_are_pooled():
     runs = [{"flight": {name: [value] for name in FIGURES}} for value in (3.0, 4.0)]
     figures = summary([*runs, {}])
     assert tuple(figures) == ("flight",)
-    assert figures["flight"]["com_m"]["rms"] == pytest.approx(np.sqrt(12.5))
+    assert figures["flight"].figures["com_m"].rms == pytest.approx(np.sqrt(12.5))
+    assert figures["flight"].to_json()["attitude_deg"] == pytest.approx({"rms": np.sqrt(12.5), "p95": 3.95})

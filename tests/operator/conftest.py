@@ -3,9 +3,11 @@ import signal
 import subprocess
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from aerial_operator.__main__ import main
 
@@ -24,6 +26,24 @@ class Ended:
     def figures(self) -> dict[str, Any]:
         """The one JSON object on standard output."""
         return json.loads(self.output)
+
+
+def paths(value, at=""):
+    """Every key of a JSON value: a dot leads into an object, ``[]`` into a list."""
+    if isinstance(value, dict):
+        return {path for key, each in value.items() for path in paths(each, f"{at}.{key}" if at else key)} or {
+            f"{at}.{{}}"
+        }
+    if isinstance(value, list):
+        return {path for each in value for path in paths(each, f"{at}[]")} or {f"{at}[]"}
+    return {at}
+
+
+@pytest.fixture(scope="session")
+def missing_keys():
+    """Return which of the keys that people and scripts rely on a JSON value lacks: ``missing_keys("plan", figures)``."""
+    promised = yaml.safe_load((Path(__file__).parent / "json_keys.yaml").read_text(encoding="utf-8"))
+    return lambda name, value: sorted(set(promised[name]) - paths(value))
 
 
 @pytest.fixture(scope="session")

@@ -23,6 +23,10 @@ def test_bench_measures_every_variant_with_and_without_warm_start(benched):
     assert all(row["solved"] == 1 and row["total_time_s"]["p50"] > 0 for row in rows)
 
 
+def test_bench_keeps_every_key(benched, missing_keys):
+    assert missing_keys("bench_planner", benched[0].figures) == []
+
+
 def test_bench_says_what_it_was_measured_on(benched):
     ended, _ = benched
     assert ended.figures["machine"].keys() >= {"processor", "cores", "load", "threads", "python", "versions"}
@@ -48,6 +52,9 @@ def test_bench_shows_progress(benched):
         (["bench", "planner", "--motions", "jmup"], 1, "did you mean 'jump'"),
         (["bench", "planner", "--repeats", "0"], 1, "expected at least 1, found 0"),
         (["bench", "planner", "--goals", "-1"], 1, "expected at least 1, found -1"),
+        (["bench", "runs", "--only", "30"], 2, "there are runs 0 to 29, found 30"),
+        (["bench", "runs", "--only", "first"], 2, "expected numbers such as 0,5,9"),
+        (["bench", "runs", "--against", "no_such_file"], 1, "no_such_file: cannot be read"),
     ],
 )
 def test_what_cannot_be_measured_is_one_sentence(aerial, arguments, status, words):
@@ -72,3 +79,32 @@ def test_a_folder_that_cannot_be_written_is_refused_before_anything_is_measured(
     assert ended.status == 1
     assert "cannot be written" in ended.errors
     assert ended.errors.count("\n") == 1
+
+
+@pytest.fixture(scope="module")
+def fingerprinted(aerial_process, tmp_path_factory):
+    """A short list of runs, and what was found of it."""
+    folder = tmp_path_factory.mktemp("runs")
+    (folder / "list.yaml").write_text("runs: [{robot: mini_cheetah, motion: jump, displacement: [0.2, 0.0, 0.0]}]")
+    options = ("--list", folder / "list.yaml", "--out", folder)
+    return aerial_process("bench", "runs", *options, "--json"), folder
+
+
+def test_bench_runs_finds_equal_runs_equal(fingerprinted, aerial_process):
+    ended, folder = fingerprinted
+    assert ended.status == 0
+    assert ended.figures["rows"][0]["landing"]["landed"]
+    options = ("--list", folder / "list.yaml", "--against", folder / "runs.json", "--out", folder / "again")
+    again = aerial_process("bench", "runs", *options)
+    assert again.status == 0
+    assert "1 of 1 are as before, to the last bit" in again.output
+
+
+def test_bench_runs_fails_and_names_what_differs(fingerprinted, aerial_process, tmp_path):
+    ended, folder = fingerprinted
+    rows = [{**ended.figures["rows"][0], "commands": "other"}]
+    (tmp_path / "before.json").write_text(json.dumps({"rows": rows}))
+    options = ("--list", folder / "list.yaml", "--against", tmp_path / "before.json", "--out", tmp_path, "--json")
+    differs = aerial_process("bench", "runs", *options)
+    assert differs.status == 1
+    assert list(differs.figures["differing"].values()) == [["commands"]]

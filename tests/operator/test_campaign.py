@@ -32,8 +32,15 @@ def test_a_campaign_leaves_results_and_a_figure(slippery):
     ended, folder = slippery
     results = [json.loads(line) for line in (folder / "trials.jsonl").read_text().splitlines()]
     assert {result["seed"] for result in results} == {4, 5}
-    assert (folder / "campaign.png").stat().st_size > 0
+    assert (folder / "campaign.png").read_bytes().startswith(b"\x89PNG")
     assert json.loads((folder / "campaign.json").read_text()) == ended.figures
+
+
+def test_a_campaign_keeps_every_key(slippery, missing_keys):
+    ended, folder = slippery
+    landed = json.loads((folder / "trials.jsonl").read_text().splitlines()[-1])
+    assert missing_keys("campaign", ended.figures) == []
+    assert missing_keys("trial", landed) == []
 
 
 def test_a_failed_trial_fails_again_when_it_is_run_alone(slippery, aerial_process, tmp_path):

@@ -8,7 +8,8 @@ from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from aerial_msgs.msg import MotionPlan, MotionResult, RobotState
-from aerial_operator.recording.recorder import TOPICS, Recorder, definition
+from aerial_operator.recording.recorder import Recorder
+from aerial_operator.recording.recording import TOPICS, definition
 from aerial_ros import qos
 from aerial_ros.messages import doubles
 

@@ -6,7 +6,8 @@ import pytest
 
 from aerial_model.errors import ConfigurationError
 from aerial_model.robot.robot import Robot
-from aerial_operator.options.settings import setting, with_settings
+from aerial_operator.options.settings import EXAMPLE, setting, with_settings
+from aerial_wbic.gains import ControllerGains
 
 ROBOT = Robot.load("mini_cheetah")
 
@@ -69,8 +70,15 @@ def test_a_misspelt_section_is_named():
 
 @pytest.mark.parametrize("text", ["number=1", "planner.number", "planner.=1", ".number=1", ""])
 def test_what_is_no_assignment_is_a_usage_error_with_an_example(text):
-    with pytest.raises(argparse.ArgumentTypeError, match="such as"):
+    with pytest.raises(argparse.ArgumentTypeError, match=f"such as {EXAMPLE}"):
         setting(text)
+
+
+def test_the_example_is_accepted_by_the_controller_and_changes_it():
+    (_, key), value = setting(EXAMPLE)
+    gains = with_settings(ROBOT, [setting(EXAMPLE)]).section("controller", ControllerGains)
+    assert getattr(gains, key) != getattr(ROBOT.section("controller", ControllerGains), key)
+    assert getattr(gains, key) == value
 
 
 def test_a_value_that_is_no_yaml_is_a_usage_error():

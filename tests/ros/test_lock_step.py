@@ -5,7 +5,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool
 
-from aerial_evaluation.judgement.landing import OBSERVE_TIME, Tick, judge
+from aerial_evaluation.judgement.landing import OBSERVE_TIME, judge
+from aerial_evaluation.record import Run, Tick
 from aerial_model.robot.robot import Robot
 from aerial_model.timing import CONTROL_PERIOD
 from aerial_model.values.frame import StartFrame
@@ -108,13 +109,8 @@ def test_a_jump_lands_and_repeats_to_the_last_bit(jump):
     truths = [ground_truth_from_message(message) for message in first.truths]
     start = STAND_PERIODS - 1
     frame = StartFrame.of(robot, truths[start].q)
-    landing = judge(
-        robot,
-        plan,
-        frame=frame,
-        start_time=truths[start].time,
-        ticks=[Tick(truth=truth) for truth in truths],
-    )
+    ticks = [Tick(truth=truth) for truth in truths]
+    landing = judge(Run(robot=robot, plan=plan, start_frame=frame, start_time=truths[start].time, ticks=ticks))
     assert landing.failed == ()
     assert first.plans == second.plans
     until_judged = STAND_PERIODS + round((plan.landing_time + OBSERVE_TIME) / CONTROL_PERIOD)

@@ -19,7 +19,9 @@ from aerial_operator import client as operator_client
 from aerial_operator.client import connected
 from aerial_operator.processes import PLANNER, PROGRAMS, SIMULATOR, NodeProcesses, parameters
 from aerial_operator.recording.recorder import Recorder
-from aerial_operator.recording.trial import execution, judged
+from aerial_operator.recording.recording import Recording
+from aerial_operator.recording.runs import execution
+from aerial_operator.recording.verdict import motions, verdicts
 from aerial_operator.terrain import TerrainService
 from aerial_ros import qos
 from aerial_sim.ros.messages import ground_truth_from_message
@@ -66,7 +68,7 @@ def jumped(client, recorder, robot):
     request_id, answers = client.select(FORWARD)
     done = execution(robot, recorder, request_id)
     assert client.wait(lambda: client.time > done.end_time, PATIENCE)
-    return answers, *judged(robot, recorder, [done])
+    return answers, *verdicts(robot, recorder, [done])
 
 
 @pytest.fixture
@@ -91,16 +93,27 @@ def test_a_jump_is_planned_started_and_landed(jumped):
 
 
 def test_it_lands_by_ground_truth(jumped):
-    _, trial = jumped
-    assert trial.landing.failed == ()
+    _, verdict = jumped
+    assert verdict.landing.failed == ()
 
 
-def test_its_figures_are_those_of_simulate(jumped, robot):
-    _, trial = jumped
-    figures = trial.to_json(robot)
+def test_its_figures_are_those_of_simulate(jumped):
+    _, verdict = jumped
+    figures = verdict.to_json()
     assert figures["landed"]
     assert figures["tick_us"]["p50"] > 0
     assert figures["plan"]["peak_torque_ratio"] < 1
+
+
+def test_the_bag_of_the_run_has_the_verdict_of_the_live_run(jumped, recorder, robot, tmp_path):
+    _, verdict = jumped
+    recorder.write(tmp_path / "bag")
+    (motion,) = motions(robot, Recording.read(tmp_path / "bag"))
+    assert motion.outcome == "landed"
+    assert motion.verdict.to_json() == verdict.to_json()
+    assert [tick.command is None for tick in motion.verdict.run.ticks] == [
+        tick.command is None for tick in verdict.run.ticks
+    ]
 
 
 def test_a_misspelt_motion_is_one_sentence_and_the_robot_stands_on(jumped, client, stands_on):

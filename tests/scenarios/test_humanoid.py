@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from aerial_evaluation import closed_loop
+from aerial_evaluation.closed_loop import run
+from aerial_evaluation.judgement.landing import judge
 from aerial_model.robot.robot import Robot
 from aerial_model.values.request import MotionRequest
 from aerial_planner.planner import Planner
@@ -21,8 +22,7 @@ def planner():
 
 @pytest.mark.parametrize("name", GOALS)
 def test_it_lands(planner, name):
-    outcome = closed_loop.run(planner.robot, GOALS[name], seed=2, planner=planner)
-    assert outcome.landing.failed == ()
+    assert judge(run(planner.robot, GOALS[name], seed=2, planner=planner)).failed == ()
 
 
 def test_its_heels_leave_before_its_toes_and_its_arms_move_unasked(planner):

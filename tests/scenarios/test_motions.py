@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from aerial_evaluation.closed_loop import run
+from aerial_evaluation.judgement.landing import judge
 from aerial_model.errors import RefusalError
 from aerial_model.robot.robot import Robot
 from aerial_model.values.request import MotionRequest
@@ -31,15 +32,14 @@ def jump(robot, *displacement, **options):
     ids=["forward", "backward", "left", "onto a platform", "off a platform"],
 )
 def test_a_jump_lands(robot, planner, displacement):
-    outcome = run(robot, jump(robot, *displacement), seed=1, planner=planner)
-    assert outcome.landing.failed == ()
+    assert judge(run(robot, jump(robot, *displacement), seed=1, planner=planner)).failed == ()
 
 
 @pytest.mark.parametrize("across", [False, True], ids=["hurdle", "gap"])
 def test_a_jump_over_an_obstacle_lands(robot, planner, across):
     request = jump(robot, 0.8, 0.0, 0.0)
     request = request.with_gap(robot, 0.3) if across else request.with_hurdle(robot, 0.1)
-    assert run(robot, request, seed=1, planner=planner).landing.failed == ()
+    assert judge(run(robot, request, seed=1, planner=planner)).failed == ()
 
 
 @pytest.mark.parametrize(
@@ -55,14 +55,13 @@ def test_a_jump_over_an_obstacle_lands(robot, planner, across):
     ids=["spin right", "roll right", "roll left", "far roll", "front flip", "back flip"],
 )
 def test_a_turning_motion_lands(robot, planner, motion, goal):
-    outcome = run(robot, MotionRequest(motion=motion, **goal), seed=1, planner=planner)
-    assert outcome.landing.failed == ()
+    assert judge(run(robot, MotionRequest(motion=motion, **goal), seed=1, planner=planner)).failed == ()
 
 
 def test_a_jump_with_optimized_timing_lands(robot, planner):
-    outcome = run(robot, jump(robot, 0.8, 0.0, 0.0, optimize_timing=True), seed=1, planner=planner)
-    assert outcome.planning.plan.take_off_time < 0.35  # [s], instead of 0.4
-    assert outcome.landing.failed == ()
+    record = run(robot, jump(robot, 0.8, 0.0, 0.0, optimize_timing=True), seed=1, planner=planner)
+    assert record.plan.take_off_time < 0.35  # [s], instead of 0.4
+    assert judge(record).failed == ()
 
 
 def test_equal_seeds_give_equal_runs_to_the_last_bit(robot, planner):

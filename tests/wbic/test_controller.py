@@ -7,7 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from aerial_evaluation.judgement.landing import OBSERVE_TIME, Tick, judge
+from aerial_evaluation.judgement.landing import OBSERVE_TIME, judge
+from aerial_evaluation.record import Run, Tick
 from aerial_model.errors import InvalidPlanError, RefusalCode, RefusalError
 from aerial_model.numerics import rotation
 from aerial_model.robot.robot import BASE_ORIENTATION, BASE_POSITION, BASE_TWIST, Robot
@@ -76,7 +77,7 @@ def test_it_hops_lands_and_stands_ready_for_the_next(robot, hop, seed):
         start = loop.measurement.time
         loop.controller.accept(hop)
         loop.run(hop.landing_time + OBSERVE_TIME)
-        verdict = judge(robot, hop, frame=frame, start_time=start, ticks=loop.ticks)
+        verdict = judge(Run(robot=robot, plan=hop, start_frame=frame, start_time=start, ticks=loop.ticks))
         assert verdict.failed == ()
         assert loop.controller.phase is Phase.STAND
     assert list(dict.fromkeys(loop.phases)) == [Phase.STAND, Phase.TAKE_OFF, Phase.FLIGHT, Phase.LANDING]

@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from aerial_evaluation.campaign.campaign import Campaign
     from aerial_evaluation.closed_loop import run
     from aerial_evaluation.judgement.landing import Landing, judge
+    from aerial_evaluation.record import Run
 else:
     __getattr__, __dir__ = reexport(
         __name__,
@@ -15,12 +16,14 @@ else:
             "campaign.campaign": ["Campaign"],
             "closed_loop": ["run"],
             "judgement.landing": ["Landing", "judge"],
+            "record": ["Run"],
         },
     )
 
 __all__ = [
     "Campaign",
     "Landing",
+    "Run",
     "judge",
     "run",
 ]

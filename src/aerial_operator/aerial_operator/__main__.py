@@ -30,6 +30,7 @@ COMMANDS = {
     "check": "check a robot folder or a URDF: what is missing, what is implausible, what to do about it",
     "up": "start planner, controller and simulator, and keep them running",
     "select": "ask running nodes for one motion, and wait for what comes of it",
+    "report": "judge every motion in a recording, such as the demo leaves, by ground truth",
 }
 BY_SHELL = {
     "test": "run the test suite",

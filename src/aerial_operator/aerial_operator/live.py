@@ -11,7 +11,7 @@ from aerial_model.values.request import MotionRequest
 from aerial_operator.client import Answer, Client
 from aerial_operator.console import say
 from aerial_operator.recording.recorder import Recorder
-from aerial_operator.recording.trial import Execution, execution
+from aerial_operator.recording.runs import Execution, execution
 
 READY_TIMEOUT = 180.0  # a planner builds the problems of all motions first, beside a control loop that comes first [s]
 OBSERVE_SPARE = 0.2  # after a landing's observation: its last ground truth may arrive after the clock [s]

@@ -1,12 +1,13 @@
 """How far a reach is looked for."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from aerial_evaluation.bench.reach import farthest
-from aerial_evaluation.bench.reach_figure import draw
+from aerial_evaluation.bench.reach_figure import End, draw
 from aerial_model.errors import RefusalError
 from aerial_model.values.request import MotionRequest
 
@@ -41,9 +42,11 @@ def test_what_binds_is_said_just_beyond_the_reach():
     assert distance < float(binds.split()[0]) < distance + 2 * RESOLUTION
 
 
-def test_the_map_is_drawn(tmp_path):
-    row = {"direction_deg": 0.0, "on_platform": False, "distance_m": 1.0, "height_m": 0.0, "binds": ""}
-    flat = [row | {"direction_deg": angle} for angle in (0.0, 120.0, 240.0)]
-    raised = [row | {"on_platform": True, "distance_m": 0.8, "height_m": height} for height in (0.0, 0.3)]
-    draw([*flat, *raised], tmp_path / "reach.png")
+def test_the_map_shows_distance_by_direction_and_height_by_distance(tmp_path):
+    end = End(direction_deg=0.0, on_platform=False, distance_m=1.0, height_m=0.0, binds="")
+    flat = [replace(end, direction_deg=angle, distance_m=1.0 + angle / 360) for angle in (0.0, 90.0, 180.0)]
+    raised = [replace(end, on_platform=True, distance_m=x, height_m=z) for x, z in ((0.8, 0.3), (1.2, 0.1))]
+    around, ahead = draw([*flat, *raised], tmp_path / "reach.png").axes
+    np.testing.assert_allclose(around.lines[0].get_xydata(), [[0.0, 1.0], [np.pi / 2, 1.25], [np.pi, 1.5]])
+    np.testing.assert_allclose(ahead.lines[0].get_xydata(), [[0.8, 0.3], [1.2, 0.1]])
     assert (tmp_path / "reach.png").read_bytes().startswith(b"\x89PNG")

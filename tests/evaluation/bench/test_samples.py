@@ -31,23 +31,24 @@ def test_percentiles_are_interpolated():
 
 
 def test_times_are_those_of_solved_requests():
-    row = summary([sample(1.0), sample(3.0), sample(9.0, solved=False)])
-    assert (row["trials"], row["solved"], row["accepted"]) == (3, 2, 2)
-    assert row["total_time_s"]["p50"] == 2.0
-    assert row["refused_time_s"]["p50"] == 9.0
-    assert row["refusals"] == [{"reason": "too far", "times": 1}]
+    found = summary([sample(1.0), sample(3.0), sample(9.0, solved=False)])
+    assert (found.trials, found.solved, found.accepted) == (3, 2, 2)
+    assert found.total_time.p50 == 2.0
+    assert found.refused_time.p50 == 9.0
+    assert found.refusals == (("too far", 1),)
 
 
 def test_a_plan_beyond_the_actuators_is_solved_but_not_accepted():
-    row = summary([sample(1.0, peak=1.2)])
-    assert (row["solved"], row["accepted"]) == (1, 0)
-    assert row["peak_torque_ratio"] == 1.2
+    found = summary([sample(1.0, peak=1.2)])
+    assert (found.solved, found.accepted) == (1, 0)
+    assert found.peak_torque_ratio == 1.2
 
 
 def test_nothing_solved_has_no_times():
-    row = summary([sample(1.0, solved=False)])
+    row = summary([sample(1.0, solved=False)]).to_json()
     assert row["total_time_s"] is None
     assert row["peak_torque_ratio"] is None
+    assert row["refusals"] == [{"reason": "too far", "times": 1}]
 
 
 class Refusing:

@@ -11,10 +11,11 @@ from matplotlib.figure import Figure
 from aerial_evaluation import figures
 from aerial_evaluation.bench.samples import Row
 from aerial_evaluation.bench.subject import Subject, usual_request
-from aerial_evaluation.closed_loop import Outcome, run
+from aerial_evaluation.closed_loop import run
+from aerial_evaluation.judgement.landing import judge
+from aerial_evaluation.record import Run
 from aerial_model.kinematics import Kinematics
-from aerial_model.robot.robot import BASE_TWIST, JOINT_POSITION, JOINT_VELOCITY, Robot
-from aerial_model.values.frame import StartFrame
+from aerial_model.robot.robot import BASE_TWIST, JOINT_POSITION, JOINT_VELOCITY
 
 LANDING = 0.6  # after touchdown that counts as the landing [s]
 PARTS = {"base": "#8a8a8a", "legs": "#1f6f8b", "arms": "#c44e33"}
@@ -49,16 +50,16 @@ def arms(subject: Subject) -> list[Row]:
     rows = []
     for motion in subject.motions:
         subject.progress(f"arms in {motion}")
-        outcome = run(robot, usual_request(motion, robot), seed=subject.seed, planner=subject.planner)
-        course = _course(outcome, robot)
+        record = run(robot, usual_request(motion, robot), seed=subject.seed, planner=subject.planner)
+        landed, course = judge(record).landed, _course(record)
         file = subject.folder / f"arms_{motion}.png"
-        _draw(course, robot, outcome, file)
+        _draw(course, record, file)
         for phase, name in enumerate(("take-off", "flight", "landing")):
             rows.append(
                 {
                     "motion": motion,
                     "phase": name,
-                    "landed": outcome.landing.landed,
+                    "landed": landed,
                     **_figures(course, phase),
                     "file": str(file),
                 }
@@ -66,8 +67,9 @@ def arms(subject: Subject) -> list[Row]:
     return rows
 
 
-def _course(outcome: Outcome, robot: Robot) -> _Course:
-    plan, kinematics = outcome.planning.plan, Kinematics(robot)
+def _course(record: Run) -> _Course:
+    robot, plan = record.robot, record.plan
+    kinematics = Kinematics(robot)
     moving = robot.planned_joints[robot.planned.arms]
     legs = np.setdiff1d(np.arange(robot.n_joints), robot.arms)
     rest = np.setdiff1d(robot.arms, moving)  # held joints go with the base
@@ -76,10 +78,10 @@ def _course(outcome: Outcome, robot: Robot) -> _Course:
         "legs": JOINT_VELOCITY.start + legs,
         "arms": JOINT_VELOCITY.start + moving,
     }
-    begin, end = outcome.start_time, outcome.start_time + plan.landing_time + LANDING
-    truths = [tick.truth for tick in outcome.ticks if begin <= tick.truth.time < end]
+    begin, end = record.start_time, record.start_time + plan.landing_time + LANDING
+    truths = [tick.truth for tick in record.ticks if begin <= tick.truth.time < end]
     time = np.array([truth.time for truth in truths]) - begin
-    R = StartFrame.of(robot, truths[0].q).R_SW
+    R = record.start_frame.R_SW
     momentum: dict[str, list[np.ndarray]] = {part: [] for part in columns}
     for truth in truths:
         A = kinematics.at(truth.q, truth.v).A_G
@@ -107,10 +109,10 @@ def _figures(course: _Course, phase: int) -> Row:
     }
 
 
-def _draw(course: _Course, robot: Robot, outcome: Outcome, file: Path) -> None:
+def _draw(course: _Course, record: Run, file: Path) -> None:
     """Draw the arms' angles, and the angular momenta about the axis where most of it is, into a PNG file."""
-    plan = outcome.planning.plan
-    axis = int(np.argmax(sum(np.abs(alpha).sum(axis=0) for alpha in course.momentum.values())))
+    plan, robot = record.plan, record.robot
+    axis = int(np.argmax(np.sum([np.abs(alpha).sum(axis=0) for alpha in course.momentum.values()], axis=0)))
     figure = Figure(figsize=_SIZE, layout="constrained")
     angles, momenta = figure.subplots(2, 1, sharex=True)
     names = np.array(robot.planned.joint_names)[robot.planned.arms]
@@ -122,7 +124,9 @@ def _draw(course: _Course, robot: Robot, outcome: Outcome, file: Path) -> None:
         )
     for part, colour in PARTS.items():
         momenta.plot(course.time, course.momentum[part][:, axis], color=colour, linewidth=1.0, label=part)
-    momenta.plot(course.time, sum(course.momentum.values())[:, axis], color="black", linewidth=1.4, label="all")
+    momenta.plot(
+        course.time, np.sum(list(course.momentum.values()), axis=0)[:, axis], color="black", linewidth=1.4, label="all"
+    )
     for axes in (angles, momenta):
         for time in (plan.take_off_time, plan.landing_time):
             axes.axvline(time, color="0.8", linewidth=0.8, zorder=0)

@@ -16,6 +16,7 @@ from aerial_evaluation.bench.environment import Environment, Peer
 from aerial_evaluation.bench.samples import Row, measure, percentiles, summary
 from aerial_evaluation.bench.scaling import KNOTS
 from aerial_evaluation.bench.subject import Subject, usual_request, usual_schedule
+from aerial_evaluation.statistics import Distribution
 from aerial_model.robot.robot import Robot
 from aerial_model.values.plan import Plan
 from aerial_planner.motion.motion import load_motion
@@ -79,6 +80,7 @@ def _rows(subject: Subject, motion: str, settings: PlannerSettings, environment:
     peer = environment.solve(problem(plan, subject.robot, settings, subject.repeats))
     ours = summary([measure(planner, request) for _ in range(subject.repeats)])
     runs = peer["runs"]
+    theirs = Distribution.of(run["cpu_time_s"] for run in runs)
     row = {
         "motion": motion,
         "knots": knots,
@@ -88,10 +90,9 @@ def _rows(subject: Subject, motion: str, settings: PlannerSettings, environment:
         "converged": sum(run["converged"] for run in runs),
         **{name: percentiles(run[name] for run in runs) for name in ("solve_time_s", "cpu_time_s", "iterations")},
         **{name: max(run[name] for run in runs) for name in _WORTH},
-        "reduced": ours,
+        "reduced": ours.to_json(),
+        "speed_ratio": None if theirs is None or ours.cpu_time is None else theirs.p50 / ours.cpu_time.p50,
     }
-    total = ours["cpu_time_s"]
-    row["speed_ratio"] = None if total is None else row["cpu_time_s"]["p50"] / total["p50"]
     return [row]
 
 
@@ -128,4 +129,5 @@ def problem(plan: Plan, robot: Robot, settings: PlannerSettings, repeats: int) -
 
 def _in_take_off(plan: Plan) -> np.ndarray:
     """Return which knots ``(K,)`` have contacts."""
-    return plan.contact.any(axis=1)
+    loaded: np.ndarray = plan.contact.any(axis=1)
+    return loaded

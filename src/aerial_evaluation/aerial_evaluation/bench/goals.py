@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from scipy.stats import qmc
@@ -18,7 +18,7 @@ from scipy.stats import qmc
 from aerial_evaluation.bench.flown import flown
 from aerial_evaluation.bench.samples import Row, Sample, measure, summary
 from aerial_evaluation.bench.subject import Subject
-from aerial_evaluation.bench.violations import violations
+from aerial_evaluation.bench.violations import violations_to_json
 from aerial_model.robot.robot import Robot
 from aerial_model.values.request import LOWER_MARGIN, UPPER_MARGIN, MotionRequest
 from aerial_planner.formulation.limits import Variant
@@ -63,14 +63,21 @@ def goals(subject: Subject) -> list[Row]:
                     "family": family.name,
                     "reach": dict(zip(family.axes, reach.T.tolist(), strict=True)),
                     "variant": variant.value,
-                    **summary(samples),
-                    **violations(samples),
-                    **flown(subject.robot, samples),
+                    **summary(samples).to_json(),
+                    **violations_to_json(samples),
+                    **asdict(flown(subject.robot, samples)),
                 }
             )
     for variant, samples in everything.items():
         row = {"family": "all", "reach": None, "variant": variant.value}
-        rows.append({**row, **summary(samples), **violations(samples), **flown(subject.robot, samples)})
+        rows.append(
+            {
+                **row,
+                **summary(samples).to_json(),
+                **violations_to_json(samples),
+                **asdict(flown(subject.robot, samples)),
+            }
+        )
     return rows
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from aerial_evaluation.bench.samples import Row, measure, percentiles, summary
 from aerial_evaluation.bench.subject import Subject, usual_request, usual_schedule
+from aerial_evaluation.statistics import Distribution
 from aerial_planner.formulation.limits import Variant
 from aerial_planner.formulation.srbm import SingleRigidBody
 from aerial_planner.formulation.thesis_literal import LiteralProblem, LiteralSolution
@@ -32,9 +33,10 @@ def literal(subject: Subject) -> list[Row]:
             subject.progress(f"thesis-literal {motion}: {repeat + 1} of {repeats}")
             theirs.append(_solve(subject, motion))
             ours.append(measure(subject.planner, request))
-        rows.append({"motion": motion, **_figures(theirs), "reduced": summary(ours)})
-        solve, total = rows[-1]["solve_time_s"], rows[-1]["reduced"]["total_time_s"]
-        rows[-1]["speed_ratio"] = None if solve is None or total is None else solve["p50"] / total["p50"]
+        solve = Distribution.of(solution.solve_time for solution in theirs if solution.converged)
+        reduced = summary(ours)
+        ratio = None if solve is None or reduced.total_time is None else solve.p50 / reduced.total_time.p50
+        rows.append({"motion": motion, **_figures(theirs), "reduced": reduced.to_json(), "speed_ratio": ratio})
     return rows
 
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from aerial_evaluation import figures
 from aerial_evaluation.bench.samples import Row, Sample, measure
 from aerial_evaluation.bench.subject import Subject, usual_request
-from aerial_evaluation.bench.violations import violations
+from aerial_evaluation.bench.violations import violations_to_json
 from aerial_model.robot.robot import Robot
 from aerial_model.values.plan import Plan
 from aerial_planner.formulation.limits import Variant
@@ -42,7 +42,7 @@ def profiles(subject: Subject) -> list[Row]:
                 "motion": motion,
                 "variant": variant.value,
                 "solved": sample.solved,
-                **violations([sample]),
+                **violations_to_json([sample]),
                 "file": str(file),
             }
             for variant, sample in samples.items()

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import asdict
 
 import numpy as np
 
 from aerial_evaluation.bench import reach_figure
+from aerial_evaluation.bench.reach_figure import End
 from aerial_evaluation.bench.samples import Row, measure
 from aerial_evaluation.bench.subject import Subject
 from aerial_model.values.request import MotionRequest
@@ -27,31 +29,29 @@ def reach(subject: Subject) -> list[Row]:
         return []
     size = subject.robot.standing_configuration()[2]  # height of the base [m]
     subject.planner.warm_up(MotionRequest(motion=_MOTION))
-    rows = []
+    ends: list[End] = []
     for angle in 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS:
         subject.progress(f"reach: {np.rad2deg(angle):.0f}°")
         direction = np.array([np.cos(angle), np.sin(angle), 0.0])
         distance, binds = farthest(subject.planner, _along(direction), _BOUND * size)
-        rows.append(_row(float(np.rad2deg(angle)), distance, 0.0, binds, on_platform=False))
+        ends.append(
+            End(
+                direction_deg=float(np.rad2deg(angle)),
+                on_platform=False,
+                distance_m=distance,
+                height_m=0.0,
+                binds=binds,
+            )
+        )
     for heights in PLATFORM_DISTANCES:
         distance = heights * size
         subject.progress(f"reach: a platform, {distance:.2f} m ahead")
         height, binds = farthest(subject.planner, _onto(subject, distance), _HEIGHT_BOUND * size)
-        rows.append(_row(0.0, distance, height, binds, on_platform=True))
+        ends.append(End(direction_deg=0.0, on_platform=True, distance_m=distance, height_m=height, binds=binds))
     file = subject.folder / "reach.png"
-    reach_figure.draw(rows, file)
+    reach_figure.draw(ends, file)
     subject.progress(f"reach: the map is {file}")
-    return rows
-
-
-def _row(direction: float, distance: float, height: float, binds: str, *, on_platform: bool) -> Row:
-    return {
-        "direction_deg": direction,
-        "on_platform": on_platform,
-        "distance_m": distance,
-        "height_m": height,
-        "binds": binds,
-    }
+    return [asdict(end) for end in ends]
 
 
 def farthest(planner: Planner, request: Callable[[float], MotionRequest], bound: float) -> tuple[float, str]:
@@ -78,7 +78,8 @@ def _refusal(planner: Planner, request: MotionRequest) -> str | None:
     sample = measure(planner, request)
     if sample.accepted:
         return None
-    return sample.report.refusal["reason"] if sample.result is None else "exact torque, voltage or speed"
+    refusal = sample.report.refusal
+    return "exact torque, voltage or speed" if refusal is None else refusal["reason"]
 
 
 def _along(direction: np.ndarray) -> Callable[[float], MotionRequest]:

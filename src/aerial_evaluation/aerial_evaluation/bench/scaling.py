@@ -44,7 +44,7 @@ def robots(subject: Subject) -> list[Row]:
             try:
                 rows.append({**size, "motion": motion, **_repeated(subject, planner, motion), "unsuited": None})
             except AerialError as error:  # the motion names contacts that this robot does not have
-                rows.append({**size, "motion": motion, **summary([]), "unsuited": str(error)})
+                rows.append({**size, "motion": motion, **summary([]).to_json(), "unsuited": str(error)})
     return rows
 
 
@@ -52,4 +52,4 @@ def _repeated(subject: Subject, planner: Planner, motion: str) -> Row:
     request = usual_request(motion, subject.robot)
     planner.warm_up(request)
     measure(planner, request)
-    return summary([measure(planner, request) for _ in range(subject.repeats)])
+    return summary([measure(planner, request) for _ in range(subject.repeats)]).to_json()

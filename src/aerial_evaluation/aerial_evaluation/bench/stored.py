@@ -42,7 +42,13 @@ def library(subject: Subject) -> list[Row]:
         for start, measured in samples.items():
             found = sum(sample.report.started_from == "library" for sample in measured)
             rows.append(
-                {"family": family.name, "start": start, "stored": len(stored), "found": found, **summary(measured)}
+                {
+                    "family": family.name,
+                    "start": start,
+                    "stored": len(stored),
+                    "found": found,
+                    **summary(measured).to_json(),
+                }
             )
     return rows
 

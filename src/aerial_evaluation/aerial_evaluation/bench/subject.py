@@ -51,8 +51,9 @@ class Subject:
 
 def motions_of(robot: Robot) -> tuple[str, ...]:
     """Return the known motions that name no contact the robot does not have, those that turn least first."""
-    turns = {name: load_motion(name, robot).rotation for name in known_motions(robot) if _suits(name, robot)}
-    return tuple(sorted(turns, key=lambda name: (0.0 if turns[name] is None else turns[name].turns, name)))
+    rules = {name: load_motion(name, robot).rotation for name in known_motions(robot) if _suits(name, robot)}
+    turns = {name: 0.0 if rule is None else rule.turns for name, rule in rules.items()}
+    return tuple(sorted(turns, key=lambda name: (turns[name], name)))
 
 
 def _suits(motion: str, robot: Robot) -> bool:

@@ -54,6 +54,17 @@ class TsidController:
         self._formulation = formulation = tsid.InverseDynamicsFormulationAccForce("tick", robot, False)
         formulation.computeProblemData(0.0, self._q[0], self._v[0])
         self._kept = []  # alive: the formulation only points to them
+        self._add_contacts(asked, model)
+        self._add_tasks(asked, model)
+        self._solver = tsid.SolverHQuadProgFast("qp")
+        self._solver.resize(formulation.nVar, formulation.nEq, formulation.nIn)
+        self._com_sample = tsid.TrajectorySample(3)
+        self._attitude_sample = tsid.TrajectorySample(12, 6)
+        self._posture_sample = tsid.TrajectorySample(robot.na)
+
+    def _add_contacts(self, asked: dict, model: pin.Model) -> None:
+        """Hold every contact point where it is, with forces in the friction pyramid."""
+        robot, formulation = self._robot, self._formulation
         for name in asked["contact_frames"]:
             contact = tsid.ContactPoint(
                 name, robot, name, np.array([0.0, 0.0, 1.0]), asked["friction"], 0.0, _FORCE_MAX
@@ -64,6 +75,10 @@ class TsidController:
             contact.setReference(robot.framePosition(formulation.data(), model.getFrameId(name)))
             formulation.addRigidContact(contact, _FORCE)
             self._kept.append(contact)
+
+    def _add_tasks(self, asked: dict, model: pin.Model) -> None:
+        """Ask for centre of mass, attitude and posture, within the torques' limits."""
+        robot, formulation = self._robot, self._formulation
         gains = np.full(3, asked["stiffness"]), np.full(3, asked["damping"])
         self._com_task = tsid.TaskComEquality("com", robot)
         self._com_task.setKp(gains[0])
@@ -86,11 +101,6 @@ class TsidController:
         bounds.setBounds(-limit, limit)
         formulation.addActuationTask(bounds, 1.0, 0, 0.0)
         self._kept.append(bounds)
-        self._solver = tsid.SolverHQuadProgFast("qp")
-        self._solver.resize(formulation.nVar, formulation.nEq, formulation.nIn)
-        self._com_sample = tsid.TrajectorySample(3)
-        self._attitude_sample = tsid.TrajectorySample(12, 6)
-        self._posture_sample = tsid.TrajectorySample(n)
 
     def tick(self, k: int) -> bool:
         """Answer a tick; return whether its program was solved."""

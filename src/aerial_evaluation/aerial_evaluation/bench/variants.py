@@ -30,7 +30,12 @@ def variants(subject: Subject) -> list[Row]:
             for request, measured in zip(requests, samples, strict=True):
                 measured.append(measure(subject.planner, request))
         rows += [
-            {"motion": motion, "variant": request.variant, "warm_start": request.warm_start, **summary(measured)}
+            {
+                "motion": motion,
+                "variant": request.variant,
+                "warm_start": request.warm_start,
+                **summary(measured).to_json(),
+            }
             for request, measured in zip(requests, samples, strict=True)
         ]
     return rows

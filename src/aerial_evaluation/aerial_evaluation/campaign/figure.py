@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from aerial_evaluation import figures
+from aerial_evaluation.campaign.campaign import TrialResult
+from aerial_evaluation.campaign.summary import Step
 from aerial_evaluation.judgement.landing import POSITION_TOLERANCE_MAX, ROTATION_TOLERANCE, TILT_MAX
 
 LANDED, FAILED = "#1f6f8b", "#c44e33"  # apart in grey and for the colour-blind too
@@ -26,34 +27,36 @@ _BEYOND = 1.6  # times a limit: where a dot is drawn that lies farther
 _RESOLUTION = 200  # [1/in]
 
 
-def draw(title: str, done: Sequence[Mapping[str, Any]], groups: Sequence[Mapping[str, Any]], file: Path) -> None:
-    """Draw into a PNG file: the share over the groups' condition, if there are groups, and every trial's figures."""
-    figure = Figure(figsize=(9.0 if groups else 5.0, 3.6), layout="constrained")
-    axes = figure.subplots(1, 2 if groups else 1, squeeze=False)[0]
-    if groups:
-        _draw_shares(axes[0], groups)
+def draw(title: str, done: Sequence[TrialResult], steps: Sequence[Step], file: Path) -> Figure:
+    """Draw into a PNG file: the share over the condition that has steps, if one has, and every trial's figures."""
+    figure = Figure(figsize=(9.0 if steps else 5.0, 3.6), layout="constrained")
+    axes = figure.subplots(1, 2 if steps else 1, squeeze=False)[0]
+    if steps:
+        _draw_shares(axes[0], steps)
     _draw_limits(axes[-1], done)
     figure.suptitle(title)
     figures.save(figure, file, _RESOLUTION)
+    return figure
 
 
-def _draw_shares(axes: Axes, groups: Sequence[Mapping[str, Any]]) -> None:
-    name = next(iter(groups[0]))
-    value = [group[name] for group in groups]
-    share = 100 * np.array([group["success_rate"] for group in groups])
-    low, high = 100 * np.array([group["interval95"] for group in groups]).T
-    axes.errorbar(
-        value, share, [np.maximum(share - low, 0), np.maximum(high - share, 0)], color=LANDED, marker="o", capsize=3
-    )
+def _draw_shares(axes: Axes, steps: Sequence[Step]) -> None:
+    name = steps[0].name
+    with_trials = [step for step in steps if step.group.share.rate is not None]
+    value = [step.value for step in with_trials]
+    share = 100 * np.array([step.group.share.rate for step in with_trials])
+    low, high = 100 * np.array([step.group.share.interval for step in with_trials]).T
+    spread = np.array([np.maximum(share - low, 0), np.maximum(high - share, 0)])
+    axes.errorbar(value, share, spread, color=LANDED, marker="o", capsize=3)
     axes.set(xlabel=UNITS.get(name, name.replace("_", " ")), ylabel="landed [%]", ylim=(-3, 103))
     axes.grid(alpha=0.3)
 
 
-def _draw_limits(axes: Axes, done: Sequence[Mapping[str, Any]]) -> None:
+def _draw_limits(axes: Axes, done: Sequence[TrialResult]) -> None:
+    executed = [(each.landed, each.executed.figures) for each in done if each.executed is not None]
     spread = np.random.default_rng(0)
     for row, (name, (limit, _)) in enumerate(LIMITS.items()):
         for landed, colour in ((True, LANDED), (False, FAILED)):
-            values = np.array([r[name] for r in done if name in r and r["landed"] == landed])
+            values = np.array([of_trial[name] for has_landed, of_trial in executed if has_landed == landed])
             share = np.minimum(values / limit, _BEYOND)
             axes.scatter(share, row + spread.uniform(-0.25, 0.25, len(share)), s=6, color=colour, alpha=0.5)
     axes.axvline(1.0, color="black", linewidth=0.8)

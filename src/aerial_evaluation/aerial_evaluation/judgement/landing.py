@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from aerial_evaluation.record import IncompleteRunError, Run, Tick
 from aerial_model.numerics import rotation
 from aerial_model.robot.robot import BASE_ANGULAR, BASE_LINEAR, BASE_ORIENTATION, Robot
-from aerial_model.values.frame import StartFrame
 from aerial_model.values.plan import Plan
 from aerial_sim.ground_truth import GroundTruth
 
@@ -29,14 +29,6 @@ POSITION_TOLERANCE = 0.05  # [m] for a jump on the spot …
 POSITION_TOLERANCE_PER_DISTANCE = 0.15  # … growing with its length …
 POSITION_TOLERANCE_MAX = 0.15  # … up to this [m]
 SATURATED_FRACTION = 0.01  # of the ticks
-
-
-@dataclass(frozen=True, kw_only=True)
-class Tick:
-    """One control period of a motion."""
-
-    truth: GroundTruth
-    fallback: bool = False  # the controller's optimization failed and its fallback acted
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,33 +71,19 @@ class Landing:
         }
 
 
-def judge(
-    robot: Robot,
-    plan: Plan,
-    *,
-    frame: StartFrame,
-    start_time: float,
-    ticks: list[Tick],
-    ground_rise: float = 0.0,
-) -> Landing:
-    """Return the verdict on one motion.
+def judge(run: Run) -> Landing:
+    """Return the verdict on one motion, from its start to ``OBSERVE_TIME`` after its planned landing.
 
-    Args:
-        robot: that moved.
-        plan: what it was to do, in the start heading frame.
-        frame: the true start heading frame.
-        start_time: when the plan's time 0 was [s].
-        ticks: every control period from the start of the motion to ``OBSERVE_TIME`` after its planned landing; what
-            lies before or after is left out.
-        ground_rise: of the landing surface over where the plan has it [m].
+    What a run recorded before or after is left out.
 
     Raises:
-        ValueError: if the ticks do not cover that time.
+        IncompleteRunError: if the run does not cover that time.
     """
-    ticks, period = _window(ticks, start_time, start_time + plan.landing_time + OBSERVE_TIME)
+    robot, plan, frame = run.robot, run.plan, run.start_frame
+    ticks, period = _window(run, run.start_time + plan.landing_time + OBSERVE_TIME)
     truths = [tick.truth for tick in ticks]
     final = truths[-1]
-    landing = start_time + plan.landing_time
+    landing = run.start_time + plan.landing_time
     settled = [truth for truth in truths if truth.time > landing + SETTLE_TIME - period / 2]
     placed = plan.placed(frame)
 
@@ -114,11 +92,9 @@ def judge(
         touchdown = int(np.searchsorted([truth.time for truth in truths], landing))
     turned = _accumulated_rotation(truths[: touchdown + 1])
     com_height = np.array([_centre_of_mass(robot, truth.q)[2] for truth in truths])
-    height = float(com_height[-1] - placed.landing_support_centre[2] - ground_rise)
+    height = float(com_height[-1] - placed.landing_support_centre[2] - run.conditions.ground_rise)
     support = robot.contact_positions(final.q).mean(axis=0)
     position_error = float(np.linalg.norm((support - placed.landing_support_centre)[:2]))
-    distance = float(np.linalg.norm(plan.landing_support_centre[:2]))
-    position_tolerance = min(POSITION_TOLERANCE_MAX, POSITION_TOLERANCE + POSITION_TOLERANCE_PER_DISTANCE * distance)
     tilt = rotation.tilt(final.q[BASE_ORIENTATION])
     rotation_error = float(np.linalg.norm(turned - placed.rotation))
     beyond = [max(truth.peak_torque_ratio, truth.peak_voltage_ratio) > 1 for truth in truths]
@@ -130,7 +106,7 @@ def judge(
         "height": abs(height - plan.landing_com_height) <= HEIGHT_TOLERANCE * plan.landing_com_height,
         "at_rest": np.linalg.norm(final.v[BASE_LINEAR]) <= SPEED_MAX,
         "rotation": rotation_error <= ROTATION_TOLERANCE,
-        "position": position_error <= position_tolerance,
+        "position": position_error <= position_tolerance(plan),
         "within_limits": np.mean(beyond) <= SATURATED_FRACTION,
         "no_fallback": not any(tick.fallback for tick in ticks),
     }
@@ -147,15 +123,24 @@ def judge(
     )
 
 
-def _window(ticks: list[Tick], start: float, end: float) -> tuple[list[Tick], float]:
-    """Return the ticks from ``start`` to ``end`` [s], both included, and the control period [s]."""
-    first, last = ticks[0].truth.time, ticks[-1].truth.time
-    period = (last - first) / max(len(ticks) - 1, 1)
+def position_tolerance(plan: Plan) -> float:
+    """Return the horizontal landing error [m] that a jump may have: it grows with the planned distance."""
+    distance = float(np.linalg.norm(plan.landing_support_centre[:2]))
+    return min(POSITION_TOLERANCE_MAX, POSITION_TOLERANCE + POSITION_TOLERANCE_PER_DISTANCE * distance)
+
+
+def _window(run: Run, end: float) -> tuple[list[Tick], float]:
+    """Return the ticks from the run's start to ``end`` [s], both included, and the control period [s]."""
+    start = run.start_time
+    if not run.ticks:
+        raise IncompleteRunError(f"a landing is judged from {start:.3f} s to {end:.3f} s; the run has no true states")
+    first, last = run.ticks[0].truth.time, run.ticks[-1].truth.time
+    period = (last - first) / max(len(run.ticks) - 1, 1)
     if first > start + period or last < end - period:
-        raise ValueError(
-            f"a landing is judged from {start:.3f} s to {end:.3f} s; ticks cover {first:.3f} s to {last:.3f} s"
+        raise IncompleteRunError(
+            f"a landing is judged from {start:.3f} s to {end:.3f} s; the true states cover {first:.3f} s to {last:.3f} s"
         )
-    return [tick for tick in ticks if start - period / 2 <= tick.truth.time <= end + period / 2], period
+    return [tick for tick in run.ticks if start - period / 2 <= tick.truth.time <= end + period / 2], period
 
 
 def _longest_flight(on_ground: np.ndarray) -> tuple[int, int]:

@@ -6,6 +6,7 @@ import itertools
 import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,13 @@ from aerial_evaluation.bench.subject import motions_of
 from aerial_model.errors import ConfigurationError
 from aerial_model.robot.robot import Robot
 from aerial_model.values.request import MotionRequest
-from aerial_operator.client import connected
+from aerial_operator.client import Client, connected
 from aerial_operator.console import pairs, say, table
 from aerial_operator.live import Attempt, attempt, await_ready, keep_apart
 from aerial_operator.processes import PLANNER, PROGRAMS, SIMULATOR, NodeProcesses, parameters
-from aerial_operator.recording.recorder import TOPICS, Recorder
-from aerial_operator.recording.trial import Trial, judged
+from aerial_operator.recording.recorder import Recorder
+from aerial_operator.recording.recording import TOPICS
+from aerial_operator.recording.verdict import Verdict, verdicts
 from aerial_planner.motion.motion import load_motion
 
 JUMPS = {"forward": (0.3, 0.0, 0.0), "back": (-0.2, 0.0, 0.0), "left": (0.0, 0.2, 0.0)}  # of motion ``jump`` [m]
@@ -27,6 +29,18 @@ _KEPT = ("ground_truth", "controller_status", "motion_plan")  # topics that a ve
 _NICENESS = 5  # of this process: listening can wait
 _TICKS_PER_SECOND = os.sysconf("SC_CLK_TCK")  # in which Linux counts processor time
 _PERCENTILES = ("p50", "p99", "max")
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Measured:
+    """What a run of the three nodes left behind."""
+
+    machine: dict[str, Any]  # as it was when the run began
+    attempts: list[Attempt]
+    seconds: float  # that it lasted [s]
+    processor_share: dict[str, float]  # program → processor time over wall time
+    loop: dict[str, str]  # the simulator's diagnostics at the end
+    recorder: Recorder
 
 
 def measure(name_or_folder: str, *, motions: Sequence[str], seconds: float, seed: int, folder: Path) -> dict[str, Any]:
@@ -59,29 +73,44 @@ def measure(name_or_folder: str, *, motions: Sequence[str], seconds: float, seed
         say(f"simulator, controller and planner start as three processes; they log to {log}")
         await_ready(client)
         client.reset_robot(seed)  # what counts begins here
-        recorder = Recorder(client, {topic: TOPICS[topic] for topic in _KEPT})
-        on = machine()
-        began, processor = time.monotonic(), {program.name: _processor_time(nodes.pid(program)) for program in PROGRAMS}
-        attempts = []
-        for name, request in _in_turn(motions):
-            attempts.append(attempt(robot, client, recorder, name, request))
-            if client.missing or time.monotonic() - began >= seconds:
-                break
-        lasted = time.monotonic() - began
-        share = {
-            program.name: (_processor_time(nodes.pid(program)) - processor[program.name]) / lasted
-            for program in PROGRAMS
-        }
-        loop = client.figures(SIMULATOR)
+        measured = _run(robot, nodes, client, motions, seconds)
     say("judging by ground truth")
-    trials = judged(robot, recorder, [each.execution for each in attempts if each.execution is not None])
-    verdicts = {trial.execution.plan.request_id: trial for trial in trials}
+    return _figures(robot, measured, seconds, seed)
+
+
+def _run(robot: Robot, nodes: NodeProcesses, client: Client, motions: Sequence[str], seconds: float) -> _Measured:
+    """Ask for motion after motion for at least ``seconds`` [s], or until the robot has fallen."""
+    recorder = Recorder(client, {topic: TOPICS[topic] for topic in _KEPT})
+    on = machine()
+    began, processor = time.monotonic(), {program.name: _processor_time(nodes.pid(program)) for program in PROGRAMS}
+    attempts = []
+    for name, request in _in_turn(motions):
+        attempts.append(attempt(robot, client, recorder, name, request))
+        if client.missing or time.monotonic() - began >= seconds:
+            break
+    lasted = time.monotonic() - began
+    taken = {program.name: _processor_time(nodes.pid(program)) - processor[program.name] for program in PROGRAMS}
+    return _Measured(
+        machine=on,
+        attempts=attempts,
+        seconds=lasted,
+        processor_share={name: time_taken / lasted for name, time_taken in taken.items()},
+        loop=client.figures(SIMULATOR),
+        recorder=recorder,
+    )
+
+
+def _figures(robot: Robot, measured: _Measured, seconds: float, seed: int) -> dict[str, Any]:
+    """Return the JSON object of a run that was to last ``seconds`` [s]."""
+    executions = [each.execution for each in measured.attempts if each.execution is not None]
+    judged = {each.run.plan.request_id: each for each in verdicts(robot, measured.recorder, executions)}
+    loop = measured.loop
     ticks, missed = int(loop["ticks"]), int(loop["missed_ticks"])
     return {
-        "machine": on,
+        "machine": measured.machine,
         "seed": seed,
-        "seconds": lasted,
-        "complete": lasted >= seconds,
+        "seconds": measured.seconds,
+        "complete": measured.seconds >= seconds,
         "control": {
             "rate_hz": float(loop["rate_hz"]),
             "ticks": ticks,
@@ -90,8 +119,8 @@ def measure(name_or_folder: str, *, motions: Sequence[str], seconds: float, seed
             "late_ticks": int(loop["late_ticks"]),
             "round_trip_us": {name: float(loop[f"round_trip_us_{name}"]) for name in _PERCENTILES},
         },
-        "processor_share": share,
-        "rows": [_row(robot, each, verdicts.get(each.request_id)) for each in attempts],
+        "processor_share": measured.processor_share,
+        "rows": [_row(each, judged.get(each.request_id)) for each in measured.attempts],
     }
 
 
@@ -138,13 +167,13 @@ def _in_turn(motions: Sequence[str]) -> Iterator[tuple[str, MotionRequest]]:
     return itertools.cycle(requests)
 
 
-def _row(robot: Robot, done: Attempt, trial: Trial | None) -> dict[str, Any]:
+def _row(done: Attempt, verdict: Verdict | None) -> dict[str, Any]:
     last = done.answers[-1]
     return {
         "motion": done.request.motion,
         "asked": done.name,
         "planning_time_s": done.answers[0].after,
-        **({"landed": False, "checks": {}} if trial is None else trial.to_json(robot)),
+        **({"landed": False, "checks": {}} if verdict is None else verdict.to_json()),
         "refusal": None if last.code is None else {"code": last.code.value, "reason": last.reason},
     }
 

@@ -6,14 +6,19 @@ import argparse
 import json
 import os
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from aerial_evaluation.campaign.campaign import FIGURES, Campaign, results, summary, trials, workers
+from aerial_evaluation.campaign.campaign import FIGURES, Campaign, TrialResult
 from aerial_evaluation.campaign.figure import draw
-from aerial_evaluation.judgement.consistency import ERRORS, NORMALIZED
+from aerial_evaluation.campaign.summary import CampaignSummary, Failure, Step, summary
+from aerial_evaluation.campaign.variation import trials
+from aerial_evaluation.campaign.workers import results, workers
+from aerial_evaluation.judgement.consistency import ERRORS, NORMALIZED, EstimateErrors
 from aerial_evaluation.judgement.tracking import FIGURES as TRACKED
+from aerial_evaluation.judgement.tracking import TrackingErrors
+from aerial_evaluation.statistics import Distribution
 from aerial_model.robot.robot import Robot
 from aerial_operator.console import ProgressBar, Report, UsageError, pairs, say, table, to_json
 from aerial_operator.options.goal import add_goal_arguments, request_from
@@ -66,32 +71,42 @@ def run(args: argparse.Namespace) -> Report:
     todo = trials(args.trials, args.seed, args.vary, conditions_from(args))
     folder = args.out or Path("out/campaign") / args.motion
     folder.mkdir(parents=True, exist_ok=True)
-    done: list[dict[str, Any]] = []
+    done: list[TrialResult] = []
     bar = ProgressBar(len(todo))
     with (folder / "trials.jsonl").open("w") as file, workers(args.workers, args.scheduler) as client:
         for result in results(campaign, todo, client):
             done.append(result)
-            print(json.dumps(result), file=file, flush=True)
-            bar.show(len(done), f"{sum(r['landed'] for r in done)} landed")
+            print(json.dumps(result.to_json()), file=file, flush=True)
+            bar.show(len(done), f"{sum(r.landed for r in done)} landed")
+    found = summary(done, args.vary)
+    commands = [_command(args, failure) for failure in found.failures]
+    figures = _figures(args, robot, found, commands, folder)
+    title = f"{args.motion} of {robot.name}: {found.all.share.succeeded} of {found.all.share.trials} landed"
+    draw(title, done, found.steps, folder / "campaign.png")
+    (folder / "campaign.json").write_text(to_json(figures) + "\n")
+    say(f"results are in {folder}")
+    return Report(success=True, figures=figures, text=_text(title, found, commands))
+
+
+def _figures(
+    args: argparse.Namespace, robot: Robot, found: CampaignSummary, commands: Sequence[str], folder: Path
+) -> dict[str, Any]:
+    """Return what ``./aerial campaign --json`` prints."""
     figures = {
         "motion": args.motion,
         "robot": robot.name,
         "noise": args.noise,
         "seed": args.seed,
-        **summary(done, args.vary),
+        **found.to_json(),
         "figure": str(folder / "campaign.png"),
         "results": str(folder / "trials.jsonl"),
     }
-    for failure in figures["failures"]:
-        failure["command"] = _command(args, failure)
-    title = f"{args.motion} of {robot.name}: {figures['landed']} of {figures['trials']} landed"
-    draw(title, done, figures["conditions"], folder / "campaign.png")
-    (folder / "campaign.json").write_text(to_json(figures) + "\n")
-    say(f"results are in {folder}")
-    return Report(success=True, figures=figures, text=_text(figures))
+    for failure, command in zip(figures["failures"], commands, strict=True):
+        failure["command"] = command
+    return figures
 
 
-def _command(args: argparse.Namespace, failure: Mapping[str, Any]) -> str:
+def _command(args: argparse.Namespace, failure: Failure) -> str:
     """Return the command line that runs a failed trial alone and draws it."""
     words = ["./aerial", "simulate", args.motion, "--to", ",".join(f"{number:g}" for number in args.to)]
     for name, usual in _PASSED_ON.items():
@@ -101,67 +116,63 @@ def _command(args: argparse.Namespace, failure: Mapping[str, Any]) -> str:
     words += [f"--{name.replace('_', '-')}" for name in ("no_warm_start", "optimize_timing") if getattr(args, name)]
     for path, value in args.settings:
         words += ["--set", f"{'.'.join(path)}={value}"]
-    for name, value in failure["conditions"].items():
+    for name, value in failure.conditions.items():
         words += ["--world", f"{name}={value!r}"]
-    return shlex.join([*words, "--seed", str(failure["seed"]), "--picture", "trial.png"])
+    return shlex.join([*words, "--seed", str(failure.seed), "--picture", "trial.png"])
 
 
-def _median(row: Mapping[str, Any], figure: str) -> str:
-    return f"{row['figures'][figure]['p50']:.3g}" if row["figures"] else "–"
-
-
-def _text(figures: Mapping[str, Any]) -> str:
-    low, high = figures["interval95"]
-    parts = [
-        f"{figures['motion']} of {figures['robot']}: {figures['landed']} of {figures['trials']} landed "
-        f"(with 95 % confidence {100 * low:.1f} to {100 * high:.1f} %)"
-    ]
-    if figures["conditions"]:
-        name = next(iter(figures["conditions"][0]))
+def _text(title: str, found: CampaignSummary, commands: Sequence[str]) -> str:
+    low, high = found.all.share.interval
+    parts = [f"{title} (with 95 % confidence {100 * low:.1f} to {100 * high:.1f} %)"]
+    if found.steps:
+        header = [found.steps[0].name, "landed", *(f"median {figure}" for figure in FIGURES)]
+        parts.append(table(header, [_step_row(step) for step in found.steps]))
+    if found.all.figures:
         rows = [
-            [f"{row[name]:g}", f"{row['landed']} of {row['trials']}", *(_median(row, figure) for figure in FIGURES)]
-            for row in figures["conditions"]
-        ]
-        parts.append(table([name, "landed", *(f"median {figure}" for figure in FIGURES)], rows))
-    if figures["figures"]:
-        rows = [
-            [name, *(f"{spread[key]:.3g}" for key in ("p50", "p95", "max"))]
-            for name, spread in figures["figures"].items()
+            [name, *(f"{value:.3g}" for value in (spread.p50, spread.p95, spread.max))]
+            for name, spread in found.all.figures.items()
         ]
         parts.append(table(["of those that landed", "median", "95 %", "largest"], rows))
-    if figures["tracking"]:
-        parts.append(_tracking(figures["tracking"]))
-    if figures["estimate"]:
-        parts.append(_estimate(figures["estimate"]))
-    if figures["failures"]:
-        shown = figures["failures"][:FAILURES_SHOWN]
-        rest = len(figures["failures"]) - len(shown)
+    if found.tracking:
+        parts.append(_tracking(found.tracking))
+    if found.estimate:
+        parts.append(_estimate(found.estimate))
+    if found.failures:
+        shown = [(failure.reason, command) for failure, command in zip(found.failures, commands, strict=True)]
+        rest = len(shown) - FAILURES_SHOWN
         parts.append(
             "not landed, and how to see it:\n"
-            + pairs([(failure["reason"], failure["command"]) for failure in shown])
-            + (f"\n  … and {rest} more" if rest else "")
+            + pairs(shown[:FAILURES_SHOWN])
+            + (f"\n  … and {rest} more" if rest > 0 else "")
         )
     return "\n\n".join(parts)
 
 
-def _tracking(phases: Mapping[str, Any]) -> str:
+def _step_row(step: Step) -> list[str]:
+    share, figures = step.group.share, step.group.figures
+    medians = [f"{figures[name].p50:.3g}" if name in figures else "–" for name in FIGURES]
+    return [f"{step.value:g}", f"{share.succeeded} of {share.trials}", *medians]
+
+
+def _tracking(phases: Mapping[str, TrackingErrors]) -> str:
     header = ["off the plan in", *(f"{name} (95 %)" for name in TRACKED)]
-    rows = [
-        [phase, *(f"{row[name]['rms']:.3g} ({row[name]['p95']:.3g})" for name in TRACKED)]
-        for phase, row in phases.items()
-    ]
+    rows = [[phase, *(_error(errors.figures[name]) for name in TRACKED)] for phase, errors in phases.items()]
     return table(header, rows)
 
 
-def _estimate(phases: Mapping[str, Any]) -> str:
+def _estimate(phases: Mapping[str, EstimateErrors]) -> str:
     header = ["estimate in", *(f"{name} (95 %)" for name in ERRORS), *NORMALIZED, "if consistent"]
     rows = [
         [
             phase,
-            *(f"{row[name]['rms']:.3g} ({row[name]['p95']:.3g})" for name in ERRORS),
-            *(f"{row[name]:.2f}" for name in NORMALIZED),
-            "{:.2f} … {:.2f}".format(*row["nees_interval95"]),
+            *(_error(found.errors[name]) for name in ERRORS),
+            *(f"{found.normalized[name]:.2f}" for name in NORMALIZED),
+            "{:.2f} … {:.2f}".format(*found.interval),
         ]
-        for phase, row in phases.items()
+        for phase, found in phases.items()
     ]
     return table(header, rows)
+
+
+def _error(distribution: Distribution) -> str:
+    return f"{distribution.rms:.3g} ({distribution.p95:.3g})"

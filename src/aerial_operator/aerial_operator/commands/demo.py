@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from aerial_model.robot.robot import Robot
-from aerial_model.values.frame import StartFrame
 from aerial_model.values.request import MotionRequest
 from aerial_operator.client import connected
 from aerial_operator.console import Report, percent, say, table
@@ -19,7 +18,7 @@ from aerial_operator.live import Attempt, attempt, await_ready, keep_apart
 from aerial_operator.picture import save_picture
 from aerial_operator.processes import PLANNER, SIMULATOR, NodeProcesses, parameters
 from aerial_operator.recording.recorder import Recorder
-from aerial_operator.recording.trial import Trial, judged
+from aerial_operator.recording.verdict import Verdict, verdicts
 
 MOTION = "jump"
 JUMPS = {
@@ -59,16 +58,16 @@ def run(args: argparse.Namespace) -> Report:
         control = _control_figures(before, client.figures(SIMULATOR), recorder, began)
     say("judging by ground truth, writing the recording, drawing")
     recorder.write(folder / "recording")
-    trials = judged(robot, recorder, [jump.execution for jump in jumps if jump.execution is not None])
-    verdicts = {trial.execution.plan.request_id: trial for trial in trials}
-    motions = [_motion_figures(robot, jump, verdicts.get(jump.request_id), args) for jump in jumps]
+    judged = verdicts(robot, recorder, [jump.execution for jump in jumps if jump.execution is not None])
+    of_request = {verdict.run.plan.request_id: verdict for verdict in judged}
+    motions = [_motion_figures(robot, jump, of_request.get(jump.request_id), args) for jump in jumps]
     landed = all(motion["landed"] for motion in motions)
     figures = {
         "landed": landed,
         "motions": motions,
         "control": control,
         "recording": str(folder / "recording"),
-        "picture": str(_draw(robot, trials[-1], folder / "jump.png")) if trials else None,
+        "picture": str(_draw(judged[-1], folder / "jump.png")) if judged else None,
     }
     return Report(success=landed, figures=figures, text=_summary(figures))
 
@@ -93,7 +92,7 @@ def _control_figures(
     }
 
 
-def _motion_figures(robot: Robot, jump: Attempt, trial: Trial | None, args: argparse.Namespace) -> dict[str, Any]:
+def _motion_figures(robot: Robot, jump: Attempt, verdict: Verdict | None, args: argparse.Namespace) -> dict[str, Any]:
     last = jump.answers[-1]
     return {
         "motion": MOTION,
@@ -102,16 +101,14 @@ def _motion_figures(robot: Robot, jump: Attempt, trial: Trial | None, args: argp
         "seed": args.seed,
         "noise": args.noise,
         "planning_time_s": jump.answers[0].after,
-        **({"landed": False, "checks": {}, "plan": None} if trial is None else trial.to_json(robot)),
+        **({"landed": False, "checks": {}, "plan": None} if verdict is None else verdict.to_json()),
         "refusal": None if last.code is None else {"code": last.code.value, "reason": last.reason},
     }
 
 
-def _draw(robot: Robot, trial: Trial, path: Path) -> Path:
+def _draw(verdict: Verdict, path: Path) -> Path:
     """Draw a jump on the terrain that was there."""
-    done = trial.execution
-    terrain = done.plan.terrain.placed(StartFrame.of(robot, trial.ticks[0].truth.q))
-    save_picture(robot, done.plan, terrain, trial.ticks, done.start_time, path)
+    save_picture(verdict.run, path)
     return path
 
 

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
-from aerial_evaluation.closed_loop import Outcome
+import numpy as np
+
 from aerial_evaluation.closed_loop import run as run_closed_loop
+from aerial_evaluation.judgement import consistency, tracking
+from aerial_evaluation.judgement.landing import Landing, judge
+from aerial_evaluation.record import Run
+from aerial_evaluation.statistics import MICRO
 from aerial_model.errors import RefusalError
 from aerial_model.robot.robot import Robot
 from aerial_operator.console import Report, pairs, percent, say
@@ -33,15 +39,37 @@ def run(args: argparse.Namespace) -> Report:
     request = request_from(args, robot, **planner_choices(args))
     planner = warm_planner(args, robot, request)
     try:
-        outcome = run_closed_loop(
+        record = run_closed_loop(
             robot, request, seed=args.seed, noise=args.noise, conditions=conditions_from(args), planner=planner
         )
     except RefusalError as refusal:
         say(f"refused: {refusal.reason}")
         return Report(success=False, figures=_refused(refusal, args.seed), text=f"{args.motion}: refused")
     if args.picture is not None:
-        save_picture(robot, outcome.planning.plan, outcome.terrain, outcome.ticks, outcome.start_time, args.picture)
-    return Report(success=outcome.landing.landed, figures=outcome.to_json(), text=_summary(outcome))
+        save_picture(record, args.picture)
+    landing = judge(record)
+    return Report(success=landing.landed, figures=_figures(record, landing), text=_summary(record, landing))
+
+
+def _figures(record: Run, landing: Landing) -> dict[str, Any]:
+    """Return what ``./aerial simulate --json`` prints."""
+    timing, report = record.timing, record.report
+    tick = None if timing is None else timing.tick
+    estimate = consistency.summary([consistency.sampled(record)])
+    tracked = tracking.summary([tracking.sampled(record)])
+    return {
+        **landing.to_json(),
+        "tick_us": None if tick is None else tick.to_json(),
+        "real_time_factor": None if timing is None else timing.real_time_factor,
+        "cpu_factor": None if timing is None else timing.cpu_factor,
+        "estimate": {phase: errors.to_json() for phase, errors in estimate.items()},
+        "tracking": {phase: errors.to_json() for phase, errors in tracked.items()},
+        "plan": None if report is None else report.to_json(),
+        "motion": record.plan.motion,
+        "robot": record.plan.robot,
+        "noise": record.noise,
+        "seed": record.seed,
+    }
 
 
 def _refused(refusal: RefusalError, seed: int) -> dict[str, object]:
@@ -50,20 +78,20 @@ def _refused(refusal: RefusalError, seed: int) -> dict[str, object]:
     return {"landed": False, "checks": {}, "plan": plan, "seed": seed, "refusal": reason}
 
 
-def _summary(outcome: Outcome) -> str:
-    landing, figures = outcome.landing, outcome.to_json()
+def _summary(record: Run, landing: Landing) -> str:
     verdict = "landed" if landing.landed else f"not landed: {', '.join(landing.failed)}"
-    tick = figures["tick_us"]
-    return f"{outcome.planning.plan.motion} of {outcome.planning.plan.robot}, seed {outcome.seed}: {verdict}\n" + pairs(
-        [
-            ("planned in", f"{outcome.planning.report.total_time_s:.2f} s"),
-            ("tilt at the end", f"{figures['tilt_deg']:.1f}°"),
-            ("height at the end", f"{landing.height:.3f} m"),
-            ("landing error", f"{100 * landing.position_error:.1f} cm, {figures['rotation_error_deg']:.1f}°"),
-            ("apex", f"{landing.apex:.2f} m"),
-            ("peak torque", f"{percent(landing.peak_torque_ratio)} of the limit"),
-            ("peak voltage", f"{percent(landing.peak_voltage_ratio)} of the limit"),
-            ("control tick", f"{tick['p50']:.0f} µs (99 %: {tick['p99']:.0f} µs)"),
-            ("speed", f"{outcome.real_time_factor:.1f} × real time"),
-        ]
-    )
+    rows = [
+        ("tilt at the end", f"{np.degrees(landing.tilt):.1f}°"),
+        ("height at the end", f"{landing.height:.3f} m"),
+        ("landing error", f"{100 * landing.position_error:.1f} cm, {np.degrees(landing.rotation_error):.1f}°"),
+        ("apex", f"{landing.apex:.2f} m"),
+        ("peak torque", f"{percent(landing.peak_torque_ratio)} of the limit"),
+        ("peak voltage", f"{percent(landing.peak_voltage_ratio)} of the limit"),
+    ]
+    if record.report is not None:
+        rows.insert(0, ("planned in", f"{record.report.total_time_s:.2f} s"))
+    if record.timing is not None and record.timing.tick is not None:
+        tick = record.timing.tick
+        rows.append(("control tick", f"{MICRO * tick.p50:.0f} µs (99 %: {MICRO * tick.p99:.0f} µs)"))
+        rows.append(("speed", f"{record.timing.real_time_factor:.1f} × real time"))
+    return f"{record.plan.motion} of {record.plan.robot}, seed {record.seed}: {verdict}\n" + pairs(rows)

@@ -10,15 +10,15 @@ import yaml
 
 from aerial_model.robot.robot import Robot
 
+EXAMPLE = "controller.weight_force=2.0"  # of an assignment, in messages
+
 
 def setting(text: str) -> tuple[list[str], Any]:
     """Return path and value of ``SECTION.KEY[.KEY…]=VALUE``."""
     name, equals, value = text.partition("=")
     path = name.split(".")
     if not equals or len(path) < 2 or not all(path):
-        raise argparse.ArgumentTypeError(
-            f"expected SECTION.KEY=VALUE, such as controller.friction_coefficient=0.4; found '{text}'"
-        )
+        raise argparse.ArgumentTypeError(f"expected SECTION.KEY=VALUE, such as {EXAMPLE}; found '{text}'")
     try:
         return path, yaml.safe_load(value)
     except yaml.YAMLError:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 
-from aerial_evaluation.campaign.campaign import Variation
+from aerial_evaluation.campaign.variation import Variation
 from aerial_model.config import closest
 from aerial_model.errors import ConfigurationError
 from aerial_operator.console import UsageError
