@@ -12,7 +12,7 @@ from aerial_model.robot.robot import BASE_ORIENTATION, BASE_POSITION, JOINT_POSI
 from aerial_model.values.plan import Plan
 from aerial_wbic.gains import ControllerGains
 from aerial_wbic.target import blank_target
-from aerial_wbic.tasks.hierarchy import decided, priorities, subordinate
+from aerial_wbic.tasks.hierarchy import add_by_null_space, least_energy_solution, no_tasks
 from aerial_wbic.tasks.tasks import command
 
 GRAVITY = 9.81  # [m/s²]
@@ -83,11 +83,11 @@ def prioritized():
     def prioritized(H, tasks):
         L = np.zeros_like(H)
         factorize(H, L)
-        memory, owned = priorities(L), 0
+        memory, owned = no_tasks(L), 0
         for task in tasks:
-            owned = subordinate(memory, owned, task)
+            owned = add_by_null_space(memory, owned, task)
         vdot, v_ref = np.empty((2, len(H)))
-        decided(memory, vdot, v_ref)
+        least_energy_solution(memory, vdot, v_ref)
         return vdot, v_ref
 
     return prioritized
@@ -95,11 +95,11 @@ def prioritized():
 
 @pytest.fixture(scope="session")
 def commanded():
-    """q̈ and q̇_ref of the controller's tasks: ``commanded(state, target, joints, arrangement)``."""
+    """q̈ and q̇_ref of the controller's tasks: ``commanded(state, target, joints, ordering)``."""
 
-    def commanded(state, target, joints, arrangement):
+    def commanded(state, target, joints, ordering):
         vdot, v_ref = np.empty((2, len(state.v)))
-        command(state.block, target.block, joints, arrangement, vdot, v_ref)
+        command(state.block, target.block, joints.block, ordering.block, vdot, v_ref)
         return vdot, v_ref
 
     return commanded

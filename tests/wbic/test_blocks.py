@@ -1,15 +1,32 @@
-"""The structures of a tick fill the blocks they lie in, and none of their arrays lies on another."""
+"""Every structure of a tick fills the block it lies in, as its layout declares it, and no array lies on another."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from aerial_model.kinematics import Kinematics
-from aerial_model.robot.robot import Robot
-from aerial_wbic.force_qp.solvers import blank_program
-from aerial_wbic.gains import ControllerGains
-from aerial_wbic.target import blank_target
+from aerial_model.kinematics import LAYOUT as CONFIGURATION
+from aerial_model.kinematics import configuration_in
+from aerial_wbic.estimation.filter_state import FILTER_STATE, filter_state_in
+from aerial_wbic.force_qp.contact_acceleration import CONTACT_ACCELERATION, contact_acceleration_in
+from aerial_wbic.force_qp.equations import SOLUTION, solution_in
+from aerial_wbic.force_qp.solvers import PROGRAM, program_in
+from aerial_wbic.joint_command import LAW, law_in
+from aerial_wbic.target import TARGET, target_in
+from aerial_wbic.tasks.limbs import JOINTS, joints_in
+from aerial_wbic.tasks.ordering import ORDERING, ordering_in
+
+LAYOUTS = {
+    "configuration": (CONFIGURATION, configuration_in),
+    "target": (TARGET, target_in),
+    "filter state": (FILTER_STATE, filter_state_in),
+    "joints": (JOINTS, joints_in),
+    "ordering": (ORDERING, ordering_in),
+    "program": (PROGRAM, program_in),
+    "contact acceleration": (CONTACT_ACCELERATION, contact_acceleration_in),
+    "solution": (SOLUTION, solution_in),
+    "actuator law": (LAW, law_in),
+}
 
 
 def arrays(structure):
@@ -21,21 +38,19 @@ def arrays(structure):
             yield value
 
 
-@pytest.mark.parametrize("name", ["mini_cheetah", "mit_humanoid"])
-@pytest.mark.parametrize("kind", ["configuration", "target", "program"])
-def test_a_structure_fills_its_block(name, kind):
-    robot = Robot.load(name)
-    gains = robot.section("controller", ControllerGains)
-    structure = {
-        "configuration": lambda: Kinematics(robot).blank(),
-        "target": lambda: blank_target(robot.n_joints, robot.n_contacts, gains.hold),
-        "program": lambda: blank_program(3 * robot.n_contacts, 5 * robot.n_contacts, 1.0, 1.0),
-    }[kind]()
-    structure.block[:] = 0.0
-    for array in arrays(structure):
+@pytest.mark.parametrize("size", [3, 8])
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_a_structure_fills_its_block(name, size):
+    layout, structure_in = LAYOUTS[name]
+    header = [each.replace(".", "__") for each in (*layout.sizes, *layout.numbers)]
+    block = layout.block(**dict.fromkeys(header, size))
+    untouched = block.copy()
+    found = list(arrays(structure_in(block)))
+    for array in found:
         array[:] = 1
-    filled = structure.block != 0.0
-    header = int(np.argmax(filled))
-    assert filled[header:].all()
-    assert sum(array.nbytes for array in arrays(structure)) <= filled.sum() * structure.block.itemsize
-    assert sum(array.nbytes for array in arrays(structure)) > (filled.sum() - 1) * structure.block.itemsize
+    assert len(found) == len(layout.arrays)
+    np.testing.assert_array_equal(block[: len(header)], untouched[: len(header)])
+    assert block[len(header) :].all()
+    nbytes = sum(array.nbytes for array in found)
+    padding = len(layout.flags) * (block.itemsize - 1)  # of truth values, to a whole number
+    assert nbytes <= block[len(header) :].nbytes <= nbytes + padding

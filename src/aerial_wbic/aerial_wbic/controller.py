@@ -35,10 +35,12 @@ from aerial_wbic.estimation.touchdown import ContactSense
 from aerial_wbic.force_qp.optimization import ForceOptimization, Solution
 from aerial_wbic.force_qp.solvers import SOLVERS
 from aerial_wbic.gains import ControllerGains, Touchdown
-from aerial_wbic.joint_command import Drive
+from aerial_wbic.joint_command import JointCommands
 from aerial_wbic.stopwatch import Clock, Part, Stopwatch
 from aerial_wbic.target import PostureTarget, WholeBodyTarget, copied_target
-from aerial_wbic.tasks.tasks import Limbs, arrangement_block, attitude_error, command
+from aerial_wbic.tasks.limbs import Limbs
+from aerial_wbic.tasks.ordering import task_ordering
+from aerial_wbic.tasks.tasks import attitude_error, command
 from aerial_wbic.trace import TickTrace
 
 _DEPTH_SHARE = 0.85  # of the depth to which legs can bend that a landing may use
@@ -89,7 +91,7 @@ class Controller:
         self.robot = robot
         self._gains = gains = _within_reach(robot.section("controller", ControllerGains), robot)
         self._limbs = Limbs(robot)
-        self._arrangement = arrangement_block(gains)
+        self._ordering = task_ordering(gains)
         self._stopwatch = Stopwatch(clock)
         self._qp = ForceOptimization(robot, gains.weight_base, gains.weight_force, SOLVERS[gains.qp_solver])
         self._estimator = Estimator(robot, gains.estimator, self._stopwatch)
@@ -105,7 +107,7 @@ class Controller:
         self._sense.forget()
         self._supervisor.reset()
         self._touching = np.zeros(self.robot.n_contacts, dtype=bool)  # points felt to bear load in the last flight tick
-        self._drive = Drive(self.robot, self._gains)
+        self._joint_commands = JointCommands(self.robot, self._gains)
         self._last: _Tick | None = None
         self._start_frame = StartFrame()  # of the plan that was accepted last
         self.estimate: Estimate | None = None  # in the odom frame; None before the first measurement
@@ -125,46 +127,46 @@ class Controller:
         self._stopwatch.lap(Part.TARGET)
         if isinstance(target, WholeBodyTarget):
             return self._balance(measurement, state, target)
-        command = self._drive.resting(target, measurement)
+        command = self._joint_commands.resting(target, measurement)
         self._stopwatch.lap(Part.TORQUE)
         self._last = _Tick(measurement, self._supervisor.behaviour, state, target, command)
         return command
 
     def _balance(self, measurement: Measurement, state: Configuration, target: WholeBodyTarget) -> Command:
         """Return the command that moves the whole body as the target asks, by forces that the ground can give."""
-        saturated_before = self._drive.saturated_ticks
+        saturated_before = self._joint_commands.saturated_ticks
         vdot_cmd, v_ref = self._accelerations(state, target)
         self._stopwatch.lap(Part.HIERARCHY)
         desired = state, vdot_cmd, target.force, target.contact
         solution = self._qp.solve(*desired)
         self._fallback_ticks += not solution.solved
         self._stopwatch.lap(Part.QP)
-        if np.count_nonzero(target.contact) and self._drive.exceeds(solution.torque, v_ref, measurement):
-            room = self._drive.room(v_ref, measurement)
+        if np.count_nonzero(target.contact) and self._joint_commands.exceeds(solution.torque, v_ref, measurement):
+            headroom = self._joint_commands.headroom(v_ref, measurement)
             self._stopwatch.lap(Part.TORQUE)
-            solution = self._qp.within(room, solution, *desired)
+            solution = self._qp.within(headroom, solution, *desired)
             self._stopwatch.lap(Part.QP)
-        command = self._drive.command(solution.torque, v_ref, measurement)
+        command = self._joint_commands.command(solution.torque, v_ref, measurement)
         self._stopwatch.lap(Part.TORQUE)
-        saturated = self._drive.saturated_ticks > saturated_before
+        saturated = self._joint_commands.saturated_ticks > saturated_before
         self._last = _Tick(
             measurement, self._supervisor.behaviour, state, target, command, vdot_cmd, v_ref, solution, saturated
         )
         return command
 
     def accept(self, plan: Plan) -> None:
-        """Begin ``plan``, given in the start heading frame, with the next measurement.
+        """Begin ``plan``, given in the start heading frame of its loaded points, with the next measurement.
 
         Raises:
             InvalidPlanError: if it is inconsistent, not finite or for another robot.
-            RefusalError: if a plan runs, the robot does not stand, or it stands elsewhere than the plan begins.
+            RefusalError: if a plan runs, the robot does not stand, or where it is and how it moves is not how the plan begins.
         """
         plan.checked(self.robot)
         self._supervisor.check(Event.PLAN_ACCEPTED)
         if self.estimate is None:
             raise RefusalError(RefusalCode.NOT_STANDING, "the robot does not stand yet: no measurement has come")
         check_start(plan, self.estimate, self.robot, self._gains)
-        self._start_frame = StartFrame.of(self.robot, self.estimate.q)
+        self._start_frame = StartFrame.of(self.robot, self.estimate.q, plan.contact[0])
         self._supervisor.ask(Event.PLAN_ACCEPTED, plan.placed(self._start_frame))
 
     def abort(self) -> None:
@@ -214,9 +216,9 @@ class Controller:
             time_in_plan=self._supervisor.time_in_plan,
             request_id="" if run is None else run.plan.request_id,
             ticks=self._ticks,
-            saturated_ticks=self._drive.saturated_ticks,
+            saturated_ticks=self._joint_commands.saturated_ticks,
             fallback_ticks=self._fallback_ticks,
-            **(self._errors() if self.phase in FOLLOWING and self._supervisor.time_in_plan > 0 else {}),
+            **(self._errors() if self.phase in FOLLOWING else {}),
         )
 
     @property
@@ -263,7 +265,7 @@ class Controller:
     def _accelerations(self, state: Configuration, target: WholeBodyTarget) -> tuple[np.ndarray, np.ndarray]:
         """Return q̈_cmd and q̇_ref ``(nv,)`` of the tasks."""
         vdot, v_ref = np.empty(len(state.v)), np.empty(len(state.v))
-        command(state.block, target.block, self._limbs.joints(target.contact), self._arrangement, vdot, v_ref)
+        command(state.block, target.block, self._limbs.joints(target.contact).block, self._ordering.block, vdot, v_ref)
         return vdot, v_ref
 
     def _rehearse(self) -> None:
@@ -283,10 +285,12 @@ class Controller:
                 localization=q[BASE_POSITION].copy(),
             )
             self.step(measurement)
-        tick = self._last
-        state, target = tick.state, tick.target
+        last = self._last
+        if last is None or not isinstance(last.target, WholeBodyTarget):
+            raise RuntimeError("a controller that was reset does not stand")
+        state, target = last.state, last.target
         desired = state, np.zeros(self.robot.model.nv), target.force, target.contact
-        self._qp.within(self._drive.room(state.v, measurement), self._qp.solve(*desired), *desired)
+        self._qp.within(self._joint_commands.headroom(state.v, measurement), self._qp.solve(*desired), *desired)
         attitude_error(target.body.orientation, state.base_orientation)
         for time in (0.0, CONTROL_PERIOD):
             self._sense.update(time, state, joints)
@@ -294,7 +298,11 @@ class Controller:
         PlanTarget(Track.still(self.robot.n_joints, self.robot.n_contacts), self._gains.follow).at(0.0)
 
     def _errors(self) -> dict[str, np.ndarray]:
-        state, target = self._last.state, self._last.target
+        """Return how far the last tick was off its plan; nothing before the plan began."""
+        last = self._last
+        if last is None or not isinstance(last.target, WholeBodyTarget) or self._supervisor.time_in_plan <= 0:
+            return {}
+        state, target = last.state, last.target
         R_SW = self._start_frame.R_SW
         return {
             "com_error": R_SW @ (target.body.com - state.com),

@@ -31,6 +31,8 @@ _UNITS = {
     "lying_height": Unit(length=1),
     "lying_rate": _RATE,
     "start_speed_tolerance": Unit(length=1, time=-1),
+    "start_velocity_tolerance": Unit(length=1, time=-1),
+    "start_momentum_tolerance": Unit(mass=1, length=2, time=-1),
 }
 
 
@@ -128,7 +130,9 @@ class ControllerGains:
     fall_tilt: float  # of the base; beyond it the robot has fallen, except in a motion [rad]
     start_joint_tolerance: float  # between a plan's first joint position and the measured one [rad]
     start_tilt_tolerance: float  # between a plan's first base attitude and the estimated one [rad]
-    start_speed_tolerance: float  # of the centre of mass when a plan is accepted [m/s]
+    start_speed_tolerance: float  # of the base when a plan that begins at rest is accepted [m/s]
+    start_velocity_tolerance: float  # of the base, from that of a plan that begins in motion [m/s]
+    start_momentum_tolerance: float  # of the angular momentum, from that of a plan that begins in motion [kg·m²/s]
     estimator: EstimatorNoise
     tasks: TaskOrder = TaskOrder.WBC_C
     task_weights: TaskWeights = field(default=TaskWeights())
@@ -153,7 +157,7 @@ _MAY_BE_ZERO = ("stiffness", "angular_momentum_damping", "joint_damping", "stop_
 
 def _numbers(section: Any) -> Iterator[tuple[str, float]]:
     """Yield the path and value of every number, those of nested gains included."""
-    names = section._fields if isinstance(section, tuple) else [field.name for field in fields(section)]
+    names = getattr(section, "_fields", None) or [field.name for field in fields(section)]
     for name in names:
         value = getattr(section, name)
         if isinstance(value, float):

@@ -9,9 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aerial_model.numerics.jit import compiled
-from aerial_model.numerics.layout import cut, cut_flags, cut_rows, flags_size
-from aerial_wbic.gains import BodyGains, Feedback
+from aerial_model.numerics.layout import Layout
+from aerial_wbic.gains import BodyGains
 
 
 class BodyTarget(NamedTuple):
@@ -40,49 +39,45 @@ class WholeBodyTarget(NamedTuple):
     block: np.ndarray  # what all these arrays lie in
 
 
-_N, _N_C, _GAINS, _HEADER = 0, 1, 2, 6  # where a block says how many joints and points there are, and the body's gains
+TARGET = Layout(
+    sizes=("n", "n_c"),
+    numbers=(
+        "body.gains.position.stiffness",
+        "body.gains.position.damping",
+        "body.gains.attitude.stiffness",
+        "body.gains.attitude.damping",
+    ),
+    arrays={
+        "body.com": (3,),
+        "body.com_velocity": (3,),
+        "body.com_acceleration": (3,),
+        "body.orientation": (4,),
+        "body.angular_velocity": (3,),
+        "body.angular_acceleration": (3,),
+        "joint_position": ("n",),
+        "joint_velocity": ("n",),
+        "joint_acceleration": ("n",),
+        "angular_momentum": (3,),
+        "angular_momentum_rate": (3,),
+        "force": ("n_c", 3),
+        "contact": ("n_c",),
+    },
+    flags={"contact"},
+)
+target_in = TARGET.reader(WholeBodyTarget)
 
 
 def blank_target(n: int, n_c: int, gains: BodyGains) -> WholeBodyTarget:
     """Return the memory of a target for n joints and n_c contact points, none of which carries load."""
-    block = np.zeros(_HEADER + 19 + 3 * n + 6 + 3 * n_c + flags_size(n_c))
-    block[:_HEADER] = n, n_c, *gains.position, *gains.attitude
+    block = TARGET.block(
+        n=n,
+        n_c=n_c,
+        body__gains__position__stiffness=gains.position.stiffness,
+        body__gains__position__damping=gains.position.damping,
+        body__gains__attitude__stiffness=gains.attitude.stiffness,
+        body__gains__attitude__damping=gains.attitude.damping,
+    )
     return target_in(block)
-
-
-@compiled
-def target_in(block: np.ndarray) -> WholeBodyTarget:
-    """Return the target that lies in a block."""
-    n, n_c = int(block[_N]), int(block[_N_C])
-    com, at = cut(block, _HEADER, 3)
-    com_velocity, at = cut(block, at, 3)
-    com_acceleration, at = cut(block, at, 3)
-    orientation, at = cut(block, at, 4)
-    angular_velocity, at = cut(block, at, 3)
-    angular_acceleration, at = cut(block, at, 3)
-    joint_position, at = cut(block, at, n)
-    joint_velocity, at = cut(block, at, n)
-    joint_acceleration, at = cut(block, at, n)
-    angular_momentum, at = cut(block, at, 3)
-    angular_momentum_rate, at = cut(block, at, 3)
-    force, at = cut_rows(block, at, n_c, 3)
-    contact, at = cut_flags(block, at, n_c)
-    gains = BodyGains(
-        Feedback(block[_GAINS], block[_GAINS + 1]),
-        Feedback(block[_GAINS + 2], block[_GAINS + 3]),
-    )
-    body = BodyTarget(com, com_velocity, com_acceleration, orientation, angular_velocity, angular_acceleration, gains)
-    return WholeBodyTarget(
-        body,
-        joint_position,
-        joint_velocity,
-        joint_acceleration,
-        angular_momentum,
-        angular_momentum_rate,
-        force,
-        contact,
-        block,
-    )
 
 
 class PostureTarget(NamedTuple):

@@ -13,7 +13,8 @@ from aerial_model.values.terrain import Terrain
 from aerial_sim.world import world
 from aerial_wbic.behaviours.support import shared_load
 from aerial_wbic.force_qp.optimization import ForceOptimization
-from aerial_wbic.tasks.tasks import Limbs, arrangement_block
+from aerial_wbic.tasks.limbs import Limbs
+from aerial_wbic.tasks.ordering import task_ordering
 
 TOLERANCE = 1e-6  # relative to the largest acceleration
 PHYSICS_DT = 0.001  # [s]
@@ -42,11 +43,11 @@ def built(robot):
 def answer(robot, gains, commanded):
     """q̈, forces and torques of one tick that asks for a push, which one or two feet cannot give, with a tilted base."""
     optimization = ForceOptimization(robot, gains.weight_base, gains.weight_force)
-    limbs, arrangement = Limbs(robot), arrangement_block(gains)
+    limbs, ordering = Limbs(robot), task_ordering(gains)
 
     def answer(state, target_at, contact):
         target = target_at(state, contact, com_acceleration=PUSH, orientation=np.array([0.0, 0.0, 0.0, 1.0]))
-        vdot_cmd, _ = commanded(state, target, limbs.joints(contact), arrangement)
+        vdot_cmd, _ = commanded(state, target, limbs.joints(contact), ordering)
         shared_load(state, PUSH, target.force)
         solution = optimization.solve(state, vdot_cmd, target.force, contact)
         assert solution.solved

@@ -13,7 +13,8 @@ from aerial_model.robot.contact import friction_pyramid
 from aerial_model.robot.robot import BASE_TWIST
 from aerial_wbic.behaviours.support import shared_load
 from aerial_wbic.force_qp import solvers
-from aerial_wbic.force_qp.optimization import ForceOptimization, Room
+from aerial_wbic.force_qp.equations import TorqueHeadroom
+from aerial_wbic.force_qp.optimization import ForceOptimization
 from aerial_wbic.force_qp.solvers import SOLVERS
 from aerial_wbic.gains import QpSolver
 
@@ -23,7 +24,7 @@ GRADIENT_TOLERANCE = 0.03  # of the cost's gradient, relative to its largest par
 KKT_TOLERANCE = 1e-6  # of the independent optimum, relative to the cost's gradient
 OPTIMUM_TOLERANCE = 0.01  # between the solver's forces and the independent ones, relative to the largest
 REST_TOLERANCE = 1e-4  # of accelerations and forces, relative to the largest: directions that are hardly held
-ROOM_TOLERANCE = 0.5  # by which a torque may leave its room [N·m], or a force the pyramid on that account [N]
+HEADROOM_TOLERANCE = 0.5  # by which a torque may leave its headroom [N·m], or a force the pyramid on that account [N]
 ACTIVE = 0.3  # slack below which a face of the pyramid is taken to bear [N]
 
 contacts = st.lists(st.booleans(), min_size=4, max_size=4).map(np.array)
@@ -63,7 +64,7 @@ def test_the_base_obeys_the_equations_of_motion(optimization, state_at, seed, co
     np.testing.assert_allclose(residual(state, solution), 0.0, atol=EQUATION_TOLERANCE)
 
 
-def giving_way(state, contact):
+def contact_consistent(state, contact):
     """E of (3.24) from its definition: least kinetic energy of the joints, loaded points at rest, as a system of equations."""
     J = state.J_contacts[contact].reshape(-1, len(state.v))
     n = len(state.v) - 6
@@ -74,12 +75,12 @@ def giving_way(state, contact):
 
 @any_state
 @given(seed=st.integers(0, 10**6), contact=contacts)
-def test_joints_give_way_with_the_base_and_loaded_points_stay(optimization, state_at, seed, contact):
+def test_joints_accelerate_with_the_base_and_loaded_points_stay(optimization, state_at, seed, contact):
     state = state_at(seed)
     vdot_cmd, f_cmd = problem(state, seed)
     change = optimization.solve(state, vdot_cmd, f_cmd, contact).vdot - vdot_cmd
     size = np.abs(change).max()
-    np.testing.assert_allclose(change, giving_way(state, contact) @ change[:6], atol=REST_TOLERANCE * size)
+    np.testing.assert_allclose(change, contact_consistent(state, contact) @ change[:6], atol=REST_TOLERANCE * size)
     np.testing.assert_allclose(state.J_contacts[contact] @ change, 0.0, atol=REST_TOLERANCE * size)
 
 
@@ -119,7 +120,7 @@ def test_no_other_forces_cost_less(optimization, robot, gains, state_at, seed, c
     vdot_cmd, f_cmd = problem(state, seed)
     solution = optimization.solve(state, vdot_cmd, f_cmd, contact)
     base = (solution.vdot - vdot_cmd)[BASE_TWIST]
-    H_E = state.M[BASE_TWIST] @ giving_way(state, contact)
+    H_E = state.M[BASE_TWIST] @ contact_consistent(state, contact)
     lift = np.linalg.solve(H_E, state.J_contacts[contact, :, BASE_TWIST].reshape(-1, 6).T)
     change = (solution.force - f_cmd)[contact].ravel()
     parts = gains.weight_base * lift.T @ base, gains.weight_force * change
@@ -131,7 +132,7 @@ def test_no_other_forces_cost_less(optimization, robot, gains, state_at, seed, c
 
 def condensed(robot, gains, state, vdot_cmd, f_cmd, contact):
     """The program (3.24) in the loaded forces x alone, min ½ xᵀ H x + gᵀ x s.t. W x ≥ 0, from its formulas."""
-    H_E = state.M[BASE_TWIST] @ giving_way(state, contact)
+    H_E = state.M[BASE_TWIST] @ contact_consistent(state, contact)
     lift = np.linalg.solve(H_E, state.J_contacts[contact, :, BASE_TWIST].reshape(-1, 6).T)
     missing = -np.linalg.solve(H_E, (state.M @ vdot_cmd + state.nle)[BASE_TWIST])
     planned = f_cmd[contact].ravel()
@@ -211,11 +212,11 @@ def test_a_failed_solve_falls_back_and_the_next_one_works(optimization, state_at
 
 
 def test_a_state_that_is_no_number_raises_nothing(optimization, state_at):
-    """The drive then only damps."""
+    """The joint_commands then only damps."""
     state = state_at(1)
-    wish = problem(state, 1)
+    desired = problem(state, 1)
     state.M[:] = np.nan
-    solution = optimization.solve(state, *wish, np.ones(4, dtype=bool))
+    solution = optimization.solve(state, *desired, np.ones(4, dtype=bool))
     assert not np.isfinite(solution.torque).any()
 
 
@@ -238,39 +239,39 @@ def landing(state):
     return vdot_cmd, load(state, np.array([0.0, 0.0, 40.0]))
 
 
-def room_of(state, torque):
-    return Room(np.full(len(state.v) - 6, -torque), np.full(len(state.v) - 6, torque))
+def headroom_of(state, torque):
+    return TorqueHeadroom(np.full(len(state.v) - 6, -torque), np.full(len(state.v) - 6, torque))
 
 
 @any_state
 @given(seed=st.integers(0, 10**6), contact=contacts.filter(np.any))
-def test_torques_stay_in_their_room(optimization, robot, state_at, seed, contact):
+def test_torques_stay_within_their_headroom(optimization, robot, state_at, seed, contact):
     state = state_at(seed)
-    wish = *landing(state), contact
-    without = optimization.solve(state, wish[0], 0 * wish[1], np.zeros(4, dtype=bool)).torque.copy()
-    plain = optimization.solve(state, *wish)
-    room = room_of(state, 12.0)
-    limited = optimization.within(room, plain, state, *wish)
+    desired = *landing(state), contact
+    without = optimization.solve(state, desired[0], 0 * desired[1], np.zeros(4, dtype=bool)).torque.copy()
+    plain = optimization.solve(state, *desired)
+    headroom = headroom_of(state, 12.0)
+    limited = optimization.within(headroom, plain, state, *desired)
     torque, bearing = limited.torque, np.repeat(contact, 3)
-    assert np.all(torque[bearing] < np.maximum(room.greatest, without)[bearing] + ROOM_TOLERANCE)
-    assert np.all(torque[bearing] > np.minimum(room.least, without)[bearing] - ROOM_TOLERANCE)
-    assert (limited.force @ friction_pyramid(robot.friction_coefficient).T).min() > -ROOM_TOLERANCE
+    assert np.all(torque[bearing] < np.maximum(headroom.greatest, without)[bearing] + HEADROOM_TOLERANCE)
+    assert np.all(torque[bearing] > np.minimum(headroom.least, without)[bearing] - HEADROOM_TOLERANCE)
+    assert (limited.force @ friction_pyramid(robot.friction_coefficient).T).min() > -HEADROOM_TOLERANCE
     np.testing.assert_allclose(residual(state, limited), 0.0, atol=EQUATION_TOLERANCE)
 
 
-def test_with_too_little_room_the_robot_brakes_as_hard_as_it_can(optimization, state_at):
+def test_with_too_little_headroom_the_robot_brakes_as_hard_as_it_can(optimization, state_at):
     state = state_at(moving=False)
     contact = np.ones(4, dtype=bool)
     plain = optimization.solve(state, *landing(state), contact)
     assert np.abs(plain.torque).max() > 15.0
-    limited = optimization.within(room_of(state, 15.0), plain, state, *landing(state), contact)
-    assert np.abs(limited.torque).max() == pytest.approx(15.0, abs=ROOM_TOLERANCE)
+    limited = optimization.within(headroom_of(state, 15.0), plain, state, *landing(state), contact)
+    assert np.abs(limited.torque).max() == pytest.approx(15.0, abs=HEADROOM_TOLERANCE)
     assert limited.force[:, 2].sum() < plain.force[:, 2].sum()
 
 
-def test_with_enough_room_nothing_changes(optimization, state_at):
+def test_with_enough_headroom_nothing_changes(optimization, state_at):
     state = state_at(moving=False)
     contact = np.ones(4, dtype=bool)
     plain = optimization.solve(state, *landing(state), contact)
-    limited = optimization.within(room_of(state, 50.0), plain, state, *landing(state), contact)
+    limited = optimization.within(headroom_of(state, 50.0), plain, state, *landing(state), contact)
     np.testing.assert_allclose(limited.force, plain.force, atol=FORCE_TOLERANCE)

@@ -13,16 +13,13 @@ from aerial_model.numerics import rotation
 from aerial_model.robot.robot import JOINT_POSITION, JOINT_VELOCITY, Robot
 from aerial_wbic.gains import ControllerGains, TaskOrder, TaskWeights
 from aerial_wbic.target import blank_target
-from aerial_wbic.tasks.hierarchy import Task, agreed, compromise, weigh_in
+from aerial_wbic.tasks.hierarchy import Task, add_weighted, no_equations, weighted_solution
+from aerial_wbic.tasks.limbs import Limbs
+from aerial_wbic.tasks.ordering import TaskKind, task_ordering
 from aerial_wbic.tasks.tasks import (
-    Limbs,
-    Statement,
     angular_momentum_task,
-    arrangement_block,
-    arrangement_in,
     attitude_error,
     base_task,
-    joints_in,
     limb_task,
     momentum_task,
     posture_task,
@@ -49,9 +46,9 @@ def tasks_of(limbs, gains):
     """The controller's tasks for a target."""
 
     def tasks_of(state, target):
-        arrangement = arrangement_in(arrangement_block(gains))
-        joints = joints_in(limbs.joints(target.contact))
-        return tuple(task_of(int(each), state, target, joints, arrangement) for each in arrangement.order)
+        ordering = task_ordering(gains)
+        joints = limbs.joints(target.contact)
+        return tuple(task_of(int(each), state, target, joints, ordering) for each in ordering.order)
 
     return tasks_of
 
@@ -66,7 +63,7 @@ def after(robot, state, vdot):
 @pytest.mark.parametrize("seed", range(5))
 def test_loaded_points_do_not_accelerate(robot, limbs, gains, state_at, target_at, seed, prioritized):
     state = state_at(seed)
-    task = limb_task(state, target_at(state, ALL), joints_in(limbs.joints(ALL)), gains.swing_joint)
+    task = limb_task(state, target_at(state, ALL), limbs.joints(ALL), gains.swing_joint)
     vdot, _ = prioritized(state.M, (task,))
     later = after(robot, state, vdot)
     change = later.contact_velocities - state.contact_velocities
@@ -115,10 +112,10 @@ def test_attitude_error_turns_the_base_to_where_it_should_be():
 
 
 def test_a_limb_swings_when_its_point_is_in_the_air(robot, limbs):
-    swinging = [robot.joint_names[j] for j in joints_in(limbs.joints(~ONE)).swinging]
+    swinging = [robot.joint_names[j] for j in limbs.joints(~ONE).swinging]
     assert swinging == ["fl_abad", "fl_hip", "fl_knee"]
-    assert list(joints_in(limbs.joints(NONE)).swinging) == list(range(robot.n_joints))
-    assert not len(joints_in(limbs.joints(ALL)).swinging)
+    assert list(limbs.joints(NONE).swinging) == list(range(robot.n_joints))
+    assert not len(limbs.joints(ALL).swinging)
 
 
 @pytest.mark.parametrize("contact", [ALL, ONE, NONE, ~ONE], ids=["four", "one", "no", "three"])
@@ -138,7 +135,7 @@ def test_reference_velocity_keeps_loaded_points_still_and_swings_the_others(
     state = state_at(seed)
     target = target_at(state, contact)
     _, v_ref = prioritized(state.M, tasks_of(state, target))
-    swinging = joints_in(limbs.joints(contact)).swinging
+    swinging = limbs.joints(contact).swinging
     np.testing.assert_allclose(state.J_contacts[contact] @ v_ref, 0.0, atol=ROUNDING)
     np.testing.assert_allclose(v_ref[JOINT_VELOCITY][swinging], target.joint_velocity[swinging], atol=ROUNDING)
 
@@ -154,32 +151,32 @@ def test_straight_legs_do_not_blow_up(robot, target_at, tasks_of, knee, prioriti
     assert np.abs(vdot).max() < ACCELERATION_MAX
 
 
-# --- the arrangements ------------------------------------------------------------------------------------------------
+# --- the orderings ---------------------------------------------------------------------------------------------------
 
 
-def arranged(gains, order):
-    return arrangement_block(dataclasses.replace(gains, tasks=order))
+def ordered(gains, order):
+    return task_ordering(dataclasses.replace(gains, tasks=order))
 
 
 @pytest.mark.parametrize("contact", [ALL, ONE, NONE, ~ONE], ids=["four", "one", "no", "three"])
 @pytest.mark.parametrize("order", TaskOrder)
-def test_in_any_arrangement_a_robot_on_its_target_stays_there(
+def test_in_any_ordering_a_robot_on_its_target_stays_there(
     state_at, target_at, limbs, gains, order, contact, commanded
 ):
     state = state_at(moving=False)
-    vdot, v_ref = commanded(state, target_at(state, contact), limbs.joints(contact), arranged(gains, order))
+    vdot, v_ref = commanded(state, target_at(state, contact), limbs.joints(contact), ordered(gains, order))
     np.testing.assert_allclose(vdot, 0.0, atol=ROUNDING)
     np.testing.assert_allclose(v_ref, 0.0, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("order", [TaskOrder.WBC_A, TaskOrder.WBC_B, TaskOrder.WBC_C])
 @pytest.mark.parametrize("contact", [ALL, ONE, NONE, ~ONE], ids=["four", "one", "no", "three"])
-def test_strict_arrangements_never_give_up_the_limbs(state_at, target_at, limbs, gains, order, contact, commanded):
+def test_strict_orderings_never_give_up_the_limbs(state_at, target_at, limbs, gains, order, contact, commanded):
     state = state_at(3)
     target = target_at(state, contact, com_acceleration=np.array([5.0, -5.0, 20.0]), com=state.com + 0.05)
-    joints, arrangement = limbs.joints(contact), arranged(gains, order)
-    first = limb_task(state, target, joints_in(joints), gains.swing_joint)
-    vdot, _ = commanded(state, target, joints, arrangement)
+    joints, ordering = limbs.joints(contact), ordered(gains, order)
+    first = limb_task(state, target, joints, gains.swing_joint)
+    vdot, _ = commanded(state, target, joints, ordering)
     np.testing.assert_allclose(first.J @ vdot, first.a, atol=ROUNDING * max(1.0, np.abs(vdot).max()))
 
 
@@ -198,7 +195,7 @@ def test_momentum_task_says_what_the_centre_of_mass_and_the_angular_momentum_tas
 
 
 def test_without_arms_a_posture_is_asked_of_what_does_not_swing(robot, state_at, target_at, limbs, gains):
-    posed = joints_in(limbs.joints(ONE)).posed
+    posed = limbs.joints(ONE).posed
     assert [robot.joint_names[j] for j in posed] == ["fl_abad", "fl_hip", "fl_knee"]
     state = state_at(1)
     task = posture_task(state, target_at(state, ONE), posed, gains.swing_joint)
@@ -208,19 +205,19 @@ def test_without_arms_a_posture_is_asked_of_what_does_not_swing(robot, state_at,
 
 def test_every_weighted_task_has_its_own_weight(gains):
     weights = TaskWeights(limbs=1.0, base=2.0, spare_joints=3.0, angular_momentum=4.0)
-    said = arrangement_in(arrangement_block(dataclasses.replace(gains, tasks=TaskOrder.WEIGHTED, task_weights=weights)))
-    expected = {Statement.LIMBS: 1.0, Statement.BASE: 2.0, Statement.SPARE_JOINTS: 3.0, Statement.ANGULAR_MOMENTUM: 4.0}
+    said = task_ordering(dataclasses.replace(gains, tasks=TaskOrder.WEIGHTED, task_weights=weights))
+    expected = {TaskKind.LIMBS: 1.0, TaskKind.BASE: 2.0, TaskKind.SPARE_JOINTS: 3.0, TaskKind.ANGULAR_MOMENTUM: 4.0}
     assert dict(zip(said.order.astype(int), said.weights, strict=True)) == expected
-    assert not len(arrangement_in(arrangement_block(gains)).weights)
+    assert not len(task_ordering(gains).weights)
 
 
 def test_weighted_tasks_share_what_they_disagree_on():
     J = np.array([[1.0, 0.0]])
     tasks = (Task(J, np.array([0.0]), np.array([3.0])), Task(J, np.array([4.0]), np.array([3.0])))
-    equations, (vdot, v_ref) = compromise(1e-6 * np.eye(2)), np.empty((2, 2))
+    equations, (vdot, v_ref) = no_equations(1e-6 * np.eye(2)), np.empty((2, 2))
     for task, weight in zip(tasks, (1.0, 3.0), strict=True):
-        weigh_in(equations, task, weight)
-    agreed(equations, vdot, v_ref)
+        add_weighted(equations, task, weight)
+    weighted_solution(equations, vdot, v_ref)
     np.testing.assert_allclose(vdot, [3.0, 0.0], atol=ROUNDING)
     np.testing.assert_allclose(v_ref, [3.0, 0.0], atol=ROUNDING)
 
@@ -234,7 +231,7 @@ def test_feet_with_several_points_are_held_without_saying_it_twice(mask):
     contact = np.array(mask, dtype=bool)
     target = blank_target(robot.n_joints, robot.n_contacts, gains.hold)
     target.contact[:] = contact
-    joints = joints_in(Limbs(robot).joints(contact))
+    joints = Limbs(robot).joints(contact)
     task = limb_task(state, target, joints, gains.swing_joint)
     assert len(task.a) == len(robot.holding_rows(contact)) + len(joints.swinging)
     assert np.linalg.matrix_rank(task.J) == len(task.a)

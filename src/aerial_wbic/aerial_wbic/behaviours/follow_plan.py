@@ -46,7 +46,8 @@ class FollowPlan(Behaviour):
         """Return the planned contacts ``(n_c,)`` bool."""
         if self.phase(time) is Phase.FLIGHT:
             return self._setting.no_point
-        return self._plan.track.contact[self._plan.interval(self._plan_time(time))]
+        contact: np.ndarray = self._plan.track.contact[self._plan.interval(self._plan_time(time))]
+        return contact
 
     def scheduled(self, time: float, touching: np.ndarray) -> Event | None:
         """Return TOUCHDOWN when the flight that the plan has is over."""

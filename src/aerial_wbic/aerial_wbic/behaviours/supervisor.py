@@ -84,6 +84,7 @@ class Supervisor:
     def __init__(self, setting: Setting) -> None:
         self._setting = setting
         self._behaviour: Behaviour = Stand(setting, Entry(Event.RESET))
+        self._is_new = True  # it has not started from a state yet
         self.reset()
 
     def reset(self) -> None:
@@ -188,7 +189,7 @@ class Supervisor:
 
     def _enter(self, behaviour: type[Behaviour], entry: Entry) -> None:
         self._behaviour = behaviour(self._setting, entry)
-        self._is_new = True  # it has not started from a state yet
+        self._is_new = True
 
     # --- what is refused ---------------------------------------------------------------------------------------------
 

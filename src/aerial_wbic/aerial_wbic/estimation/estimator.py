@@ -11,7 +11,7 @@ and one gain: the state is a matrix X ``(2 + n_c, 3)`` with rows [p, v, c_1 …]
     u_i = v + R (ω × p_i + ṗ_i) + w_v                 u_i: velocity of a centre whose sphere rolls
 
 Only loaded points are measured. Where a point touches down is where forward kinematics says it does: nothing is
-assumed about the height of the ground. A loaded point that moves against the filter's belief (not yet down, slipping) is
+assumed about the height of the ground. A loaded point that moves against the filter's estimate (not yet down, slipping) is
 believed less in proportion: its noise grows with the square of the disagreement, and it is anchored anew. So is, for a
 moment, every point that the schedule has just put on the ground.
 """
@@ -25,7 +25,6 @@ import numpy as np
 from aerial_model.kinematics import Configuration, Kinematics, Workspace, carry, configuration_in, fill
 from aerial_model.numerics.components import ZERO, exp_of, matrix_of, product_of, quaternion, sum_of, vector
 from aerial_model.numerics.jit import compiled
-from aerial_model.numerics.layout import cut, cut_rows
 from aerial_model.numerics.linalg import cholesky, cholesky_solve
 from aerial_model.robot.robot import (
     BASE_ANGULAR,
@@ -39,35 +38,23 @@ from aerial_model.robot.robot import (
 )
 from aerial_model.values.estimate import Estimate
 from aerial_model.values.measurement import Measurement
+from aerial_wbic.estimation.filter_state import FEET, FilterState, P, V, filter_state_in, initial_filter_state
 from aerial_wbic.gains import EstimatorNoise
 from aerial_wbic.stopwatch import Part, Stopwatch
 
-P, V, FEET = 0, 1, 2  # rows of X; the contact points fill it from FEET on
 _INSTANT = 1e-3  # [s] less than a period
 _GATE = 4.0  # squared disagreement, in variances, from which a point is believed less
 
 
-class Belief(NamedTuple):
-    """What the filter believes; its arrays change in place. All of it lies in one block."""
+class _Sensed(NamedTuple):
+    """What the sensors say over one period."""
 
-    orientation: np.ndarray  # of B (4,)
-    X: np.ndarray  # (2 + n_c, 3)
-    P: np.ndarray  # (2 + n_c, 2 + n_c)
-    roll: np.ndarray  # u_i of the loaded points, else zero (n_c, 3) [m/s]
-    loaded_since: np.ndarray  # (n_c,) [s]
-    block: np.ndarray  # what all these arrays lie in
-
-
-@compiled
-def belief_in(block: np.ndarray) -> Belief:
-    """Return the belief that lies in a block, which begins with the number of contact points."""
-    n_c = int(block[0])
-    orientation, at = cut(block, 1, 4)
-    X, at = cut_rows(block, at, FEET + n_c, 3)
-    covariance, at = cut_rows(block, at, FEET + n_c, FEET + n_c)
-    roll, at = cut_rows(block, at, n_c, 3)
-    loaded_since, at = cut(block, at, n_c)
-    return Belief(orientation, X, covariance, roll, loaded_since, block)
+    angular_velocity_before: np.ndarray  # at its beginning, in B (3,) [rad/s]
+    angular_velocity: np.ndarray  # at its end (3,) [rad/s]
+    specific_force: np.ndarray  # in B (3,) [m/s²]
+    orientation: np.ndarray  # that the inertial unit reports (4,)
+    joint_position: np.ndarray  # (n,) [rad]
+    joint_velocity: np.ndarray  # (n,) [rad/s]
 
 
 class Estimator:
@@ -82,8 +69,7 @@ class Estimator:
     def __init__(self, robot: Robot, noise: EstimatorNoise, stopwatch: Stopwatch | None = None) -> None:
         self._stopwatch = stopwatch or Stopwatch()
         self.kinematics = Kinematics(robot)
-        self.state: Configuration | None = None  # the robot at the estimate, until the next; None before the first
-        self._memory = self.kinematics.blank()  # of state
+        self.state = self.kinematics.blank()  # the robot at the estimate, until the next; zeros before the first
         self._noise = noise
         self._radius = np.array([point.radius for point in robot.contact_points])  # (n_c,) [m]
         self.reset()
@@ -91,7 +77,6 @@ class Estimator:
     def reset(self) -> None:
         """Forget everything; the next measurement puts the support's centre at the origin of W, unless it is localized."""
         self._time: float | None = None
-        self.state = None
 
     def update(self, measurement: Measurement, contact: np.ndarray) -> Estimate:
         """Return the estimate at the measurement's time.
@@ -100,23 +85,20 @@ class Estimator:
             measurement: of the robot.
             contact: points the schedule has on the ground ``(n_c,)`` bool.
         """
-        first = self._time is None
-        if first:
-            self._time, self._gyro = measurement.time, measurement.angular_velocity
-            self._belief = _nothing(measurement.orientation, len(self._radius))
-        state = self._memory
-        _predict(
-            self._belief.block,
-            state.block,
-            measurement.time - self._time,
+        first, before = self._time is None, self._time
+        if before is None:
+            before, self._gyro = measurement.time, measurement.angular_velocity
+            self._filter = initial_filter_state(measurement.orientation, len(self._radius))
+        state = self.state
+        sensed = _Sensed(
             self._gyro,
             measurement.angular_velocity,
             measurement.linear_acceleration,
             measurement.orientation,
             measurement.joint_position,
             measurement.joint_velocity,
-            self._noise,
         )
+        _predict(self._filter.block, state.block, measurement.time - before, sensed, self._noise)
         self._stopwatch.lap(Part.ESTIMATE)
         workspace = self.kinematics.computed(state.q, state.v)
         self._stopwatch.lap(Part.KINEMATICS)
@@ -124,65 +106,49 @@ class Estimator:
             self._begin(workspace.contacts, measurement.localization)
         self._time, self._gyro = measurement.time, measurement.angular_velocity
         if measurement.localization is not None:
-            _correct_position(self._belief, measurement.localization, self._noise)
-        _correct(self._belief.block, state.block, workspace, self._radius, contact, measurement.time, self._noise)
-        self.state = state
+            _correct_position(self._filter, measurement.localization, self._noise)
+        _correct(self._filter.block, state.block, workspace, self._radius, contact, measurement.time, self._noise)
         return Estimate(
             time=measurement.time,
             q=state.q.copy(),
             v=state.v.copy(),
-            position_variance=float(self._belief.P[P, P]),
-            velocity_variance=float(self._belief.P[V, V]),
+            position_variance=float(self._filter.P[P, P]),
+            velocity_variance=float(self._filter.P[V, V]),
         )
 
     def _begin(self, offset: np.ndarray, localization: np.ndarray | None) -> None:
         """Take the contact points, ``offset`` ``(n_c, 3)`` from the base, to rest on level ground."""
-        belief = self._belief
-        belief.X[P] = [0.0, 0.0, self._radius.mean()] - offset.mean(axis=0)
-        belief.P[P, P] = self._noise.foot_position**2  # the attitude's error moves all offsets alike: no mean over feet
+        filter_state = self._filter
+        filter_state.X[P] = [0.0, 0.0, self._radius.mean()] - offset.mean(axis=0)
+        # The attitude's error moves all offsets alike: no mean over feet.
+        filter_state.P[P, P] = self._noise.foot_position**2
         if localization is not None:
-            belief.X[P] = localization
-            belief.P[P, P] = self._noise.localization**2
-        belief.P[V, V] = self._noise.foot_velocity**2
+            filter_state.X[P] = localization
+            filter_state.P[P, P] = self._noise.localization**2
+        filter_state.P[V, V] = self._noise.foot_velocity**2
         for i in range(len(offset)):
-            _anchor(belief, i, offset[i], self._noise)
-
-
-def _nothing(orientation: np.ndarray, n_c: int) -> Belief:
-    """Return the belief in an attitude ``(4,)`` and nothing else yet."""
-    rows = FEET + n_c
-    block = np.zeros(1 + 4 + 3 * rows + rows**2 + 3 * n_c + n_c)
-    block[0] = n_c
-    belief = belief_in(block)
-    belief.orientation[:] = orientation
-    belief.loaded_since[:] = -np.inf  # a robot that is switched on stands firmly
-    return belief
+            _anchor(filter_state, i, offset[i], self._noise)
 
 
 @compiled
 def _predict(
-    belief_block: np.ndarray,
-    state_block: np.ndarray,
-    dt: float,
-    gyro_before: np.ndarray,
-    gyro: np.ndarray,
-    specific_force: np.ndarray,
-    reported: np.ndarray,
-    joint_position: np.ndarray,
-    joint_velocity: np.ndarray,
-    noise: EstimatorNoise,
+    filter_block: np.ndarray, state_block: np.ndarray, dt: float, sensed: _Sensed, noise: EstimatorNoise
 ) -> None:
-    """Carry the belief on by ``dt`` [s]; ``reported`` is the inertial unit's attitude.
+    """Carry the filter on by ``dt`` [s].
 
-    Write into the robot's q and v what the sensors and the believed attitude say, the base at the origin and linearly at
+    Write into the robot's q and v what the sensors and the estimated attitude say, the base at the origin and linearly at
     rest.
     """
-    belief, state = belief_in(belief_block), configuration_in(state_block)
+    filter_state, state = filter_state_in(filter_block), configuration_in(state_block)
+    specific_force = sensed.specific_force
     q, v = state.q, state.v
-    X, cov = belief.X, belief.P
-    half_turn = exp_of(sum_of(ZERO, sum_of(vector(gyro_before), vector(gyro), 1.0), dt / 4))
-    midway = product_of(quaternion(belief.orientation), half_turn)
-    _draw(belief.orientation, product_of(midway, half_turn), quaternion(reported), min(dt / noise.attitude_time, 1.0))
+    X, cov = filter_state.X, filter_state.P
+    half_turn = exp_of(
+        sum_of(ZERO, sum_of(vector(sensed.angular_velocity_before), vector(sensed.angular_velocity), 1.0), dt / 4)
+    )
+    midway = product_of(quaternion(filter_state.orientation), half_turn)
+    share = min(dt / noise.attitude_time, 1.0)
+    _draw(filter_state.orientation, product_of(midway, half_turn), quaternion(sensed.orientation), share)
     # The accelerometer reports the mean over the interval: it acts at the attitude half-way.
     R = matrix_of(midway)
     for axis in range(3):
@@ -192,8 +158,8 @@ def _predict(
             a -= GRAVITY
         X[P, axis] += X[V, axis] * dt + a * dt**2 / 2
         X[V, axis] += a * dt
-        for i in range(len(belief.roll)):
-            X[FEET + i, axis] += belief.roll[i, axis] * dt
+        for i in range(len(filter_state.roll)):
+            X[FEET + i, axis] += filter_state.roll[i, axis] * dt
     for k in range(len(X)):
         cov[P, k] += dt * cov[V, k]  # F P Fᵀ
     for k in range(len(X)):
@@ -205,12 +171,12 @@ def _predict(
     cov[V, V] += push
     for i in range(FEET, len(X)):
         cov[i, i] += noise.foot_drift**2 * dt
-    q[BASE_POSITION], q[BASE_ORIENTATION], q[JOINT_POSITION] = 0.0, belief.orientation, joint_position
-    v[BASE_LINEAR], v[BASE_ANGULAR], v[JOINT_VELOCITY] = 0.0, gyro, joint_velocity
+    q[BASE_POSITION], q[BASE_ORIENTATION], q[JOINT_POSITION] = 0.0, filter_state.orientation, sensed.joint_position
+    v[BASE_LINEAR], v[BASE_ANGULAR], v[JOINT_VELOCITY] = 0.0, sensed.angular_velocity, sensed.joint_velocity
 
 
 @compiled
-def _draw(orientation: np.ndarray, attitude: tuple, towards: tuple, share: float) -> None:
+def _draw(orientation: np.ndarray, attitude: tuple[float, ...], towards: tuple[float, ...], share: float) -> None:
     """Write an attitude drawn to one close by, by ``share`` of the way; both by the components of quaternions."""
     along = attitude[0] * towards[0] + attitude[1] * towards[1] + attitude[2] * towards[2] + attitude[3] * towards[3]
     sign, squared = np.copysign(1.0, along), 0.0
@@ -223,7 +189,7 @@ def _draw(orientation: np.ndarray, attitude: tuple, towards: tuple, share: float
 
 @compiled
 def _correct(
-    belief_block: np.ndarray,
+    filter_block: np.ndarray,
     state_block: np.ndarray,
     workspace: Workspace,
     radius: np.ndarray,
@@ -231,38 +197,43 @@ def _correct(
     time: float,
     noise: EstimatorNoise,
 ) -> None:
-    """Fill in the robot as seen from its base, let its loaded points measure; then move it to where it is believed to be."""
-    belief, state = belief_in(belief_block), configuration_in(state_block)
+    """Fill in the robot as seen from its base, let its loaded points measure; then move it to where it is estimated to be."""
+    filter_state, state = filter_state_in(filter_block), configuration_in(state_block)
     fill(state, workspace)
-    _correct_by_legs(belief, state, radius, contact, time, noise)
-    carry(state, belief.X[P], belief.X[V])
+    _correct_by_legs(filter_state, state, radius, contact, time, noise)
+    carry(state, filter_state.X[P], filter_state.X[V])
 
 
 @compiled
 def _correct_by_legs(
-    belief: Belief, state: Configuration, radius: np.ndarray, contact: np.ndarray, time: float, noise: EstimatorNoise
+    filter_state: FilterState,
+    state: Configuration,
+    radius: np.ndarray,
+    contact: np.ndarray,
+    time: float,
+    noise: EstimatorNoise,
 ) -> None:
     """Kalman update by forward kinematics: R p_i are the contact positions, R (ω × p_i + ṗ_i) the contact velocities."""
-    X = belief.X
+    X = filter_state.X
     loaded = np.flatnonzero(contact)
     n = len(loaded)
-    belief.roll[:] = 0.0
-    belief.loaded_since[~contact] = time
+    filter_state.roll[:] = 0.0
+    filter_state.loaded_since[~contact] = time
     if n == 0:
         return
     slip = np.empty((n, 3))  # innovation of u_i = v + R (ω × p_i + ṗ_i)
     variance = np.empty(n + 1)
     for row, i in enumerate(loaded):
         # A sphere that rolls without slip on level ground has its centre moving at ω × (0, 0, radius).
-        belief.roll[i, 0] = state.omega_contacts[i, 1] * radius[i]
-        belief.roll[i, 1] = -state.omega_contacts[i, 0] * radius[i]
+        filter_state.roll[i, 0] = state.omega_contacts[i, 1] * radius[i]
+        filter_state.roll[i, 1] = -state.omega_contacts[i, 0] * radius[i]
         for axis in range(3):
-            slip[row, axis] = belief.roll[i, axis] - X[V, axis]
+            slip[row, axis] = filter_state.roll[i, axis] - X[V, axis]
             for k in range(len(state.v)):
                 slip[row, axis] -= state.J_contacts[i, axis, k] * state.v[k]
-        distrust = _distrust(belief, i, slip[row], time, noise)
+        distrust = _distrust(filter_state, int(i), slip[row], time, noise)
         if distrust > 1.0:
-            _anchor(belief, i, state.contact_positions[i], noise)
+            _anchor(filter_state, int(i), state.contact_positions[i], noise)
         variance[row] = distrust
     # The points' velocities measure the same v: their mean, weighted by trust, stands for all.
     H, innovation, trust = np.zeros((n + 1, len(X))), np.zeros((n + 1, 3)), 0.0
@@ -280,33 +251,33 @@ def _correct_by_legs(
     speed = X[V, 0] ** 2 + X[V, 1] ** 2 + X[V, 2] ** 2
     in_motion = noise.foot_velocity_share**2 * speed  # common to all points: no mean over them
     variance[n] = noise.foot_velocity**2 / trust + in_motion
-    _apply(belief, H, innovation, variance)
+    _apply(filter_state, H, innovation, variance)
 
 
 @compiled
-def _distrust(belief: Belief, i: int, slip: np.ndarray, time: float, noise: EstimatorNoise) -> float:
+def _distrust(filter_state: FilterState, i: int, slip: np.ndarray, time: float, noise: EstimatorNoise) -> float:
     """Return the factor by which the variance of loaded point i is larger than in a firm stance.
 
     Large just after the scheduled touchdown, which may not have happened yet, and for a point that slips.
     """
-    variance = belief.P[V, V] + noise.foot_velocity**2
+    variance = filter_state.P[V, V] + noise.foot_velocity**2
     slipping = (slip[0] ** 2 + slip[1] ** 2 + slip[2] ** 2) / (3 * _GATE * variance)
-    age = max(time - belief.loaded_since[i], _INSTANT)
-    return max(1.0, slipping) * max(1.0, noise.touchdown_time / age) ** 2
+    age = max(time - filter_state.loaded_since[i], _INSTANT)
+    return float(max(1.0, slipping) * max(1.0, noise.touchdown_time / age) ** 2)
 
 
 @compiled
-def _correct_position(belief: Belief, position: np.ndarray, noise: EstimatorNoise) -> None:
-    H, innovation = np.zeros((1, len(belief.X))), np.empty((1, 3))
+def _correct_position(filter_state: FilterState, position: np.ndarray, noise: EstimatorNoise) -> None:
+    H, innovation = np.zeros((1, len(filter_state.X))), np.empty((1, 3))
     H[0, P] = 1.0
-    innovation[0] = position - belief.X[P]
-    _apply(belief, H, innovation, np.array([noise.localization**2]))
+    innovation[0] = position - filter_state.X[P]
+    _apply(filter_state, H, innovation, np.array([noise.localization**2]))
 
 
 @compiled
-def _apply(belief: Belief, H: np.ndarray, innovation: np.ndarray, variance: np.ndarray) -> None:
+def _apply(filter_state: FilterState, H: np.ndarray, innovation: np.ndarray, variance: np.ndarray) -> None:
     """Kalman update with measurement rows H ``(m, 2 + n_c)``, innovations ``(m, 3)`` and variances ``(m,)``."""
-    X, cov, (m, n) = belief.X, belief.P, H.shape
+    X, cov, (m, n) = filter_state.X, filter_state.P, H.shape
     HP, S = np.zeros((m, n)), np.zeros((m, m))
     for i in range(m):
         for k in range(n):
@@ -336,10 +307,10 @@ def _apply(belief: Belief, H: np.ndarray, innovation: np.ndarray, variance: np.n
 
 
 @compiled
-def _anchor(belief: Belief, i: int, offset: np.ndarray, noise: EstimatorNoise) -> None:
+def _anchor(filter_state: FilterState, i: int, offset: np.ndarray, noise: EstimatorNoise) -> None:
     """Take contact point i to rest where forward kinematics has it: c_i = p + R p_i, as uncertain as p and p_i."""
     row = FEET + i
-    belief.X[row] = belief.X[P] + offset
-    belief.P[row, :] = belief.P[P, :]
-    belief.P[:, row] = belief.P[:, P]
-    belief.P[row, row] = belief.P[P, P] + noise.foot_position**2
+    filter_state.X[row] = filter_state.X[P] + offset
+    filter_state.P[row, :] = filter_state.P[P, :]
+    filter_state.P[:, row] = filter_state.P[:, P]
+    filter_state.P[row, row] = filter_state.P[P, P] + noise.foot_position**2

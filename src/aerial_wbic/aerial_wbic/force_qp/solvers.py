@@ -10,8 +10,7 @@ import numpy as np
 import osqp
 from scipy import sparse
 
-from aerial_model.numerics.jit import compiled
-from aerial_model.numerics.layout import cut, cut_rows
+from aerial_model.numerics.layout import Layout
 from aerial_wbic.force_qp.contact_acceleration import N_BASE
 from aerial_wbic.gains import QpSolver
 
@@ -44,38 +43,33 @@ class QuadraticProgram(NamedTuple):
     A: np.ndarray  # (m, 3 n)
     lower: np.ndarray  # (m,)
     upper: np.ndarray  # (m,)
-    G: np.ndarray  # (6, 3 n): how the base gives way, √Q_1 δ_q = G x + g
+    G: np.ndarray  # (6, 3 n) of the base's acceleration, √Q_1 δ_q = G x + g
     g: np.ndarray  # (6,)
     root_base: float  # √Q_1
     root_force: float  # √Q_2
     block: np.ndarray  # what all of it lies in
 
 
-_N, _M, _ROOT_BASE, _ROOT_FORCE, _HEADER = range(
-    5
-)  # where a block says how many variables and rows there are, and weights
+PROGRAM = Layout(
+    sizes=("n", "m"),  # variables, rows
+    numbers=("root_base", "root_force"),
+    arrays={
+        "H": ("n", "n"),
+        "triangle": ("n * (n + 1) // 2",),
+        "f": ("n",),
+        "A": ("m", "n"),
+        "lower": ("m",),
+        "upper": ("m",),
+        "G": (N_BASE, "n"),
+        "g": (N_BASE,),
+    },
+)
+program_in = PROGRAM.reader(QuadraticProgram)
 
 
 def blank_program(n: int, m: int, root_base: float, root_force: float) -> QuadraticProgram:
     """Return the memory of a program of n variables and m rows."""
-    block = np.zeros(_HEADER + n * n + n * (n + 1) // 2 + n + m * n + 2 * m + N_BASE * n + N_BASE)
-    block[:_HEADER] = n, m, root_base, root_force
-    return program_in(block)
-
-
-@compiled
-def program_in(block: np.ndarray) -> QuadraticProgram:
-    """Return the program that lies in a block."""
-    n, m = int(block[_N]), int(block[_M])
-    H, at = cut_rows(block, _HEADER, n, n)
-    triangle, at = cut(block, at, n * (n + 1) // 2)
-    f, at = cut(block, at, n)
-    A, at = cut_rows(block, at, m, n)
-    lower, at = cut(block, at, m)
-    upper, at = cut(block, at, m)
-    G, at = cut_rows(block, at, N_BASE, n)
-    g, at = cut(block, at, N_BASE)
-    return QuadraticProgram(H, triangle, f, A, lower, upper, G, g, block[_ROOT_BASE], block[_ROOT_FORCE], block)
+    return program_in(PROGRAM.block(n=n, m=m, root_base=root_base, root_force=root_force))
 
 
 class QpMinimizer(Protocol):

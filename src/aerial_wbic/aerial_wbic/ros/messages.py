@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,6 +17,7 @@ from aerial_wbic.controller import ControllerStatus
 
 ODOMETRY_FRAME = "odom"
 BASE_FRAME = "base_link"
+WINDOW_TICKS = 1000  # that a status looks back on: 2 s
 _ERRORS = ("com_error", "com_velocity_error", "orientation_error", "angular_momentum_error")
 _COUNTERS = ("ticks", "saturated_ticks", "fallback_ticks")
 
@@ -25,17 +27,19 @@ class Pace:
     """How the node kept up."""
 
     missed_ticks: int = 0  # states that never got their command in time, since activation
-    tick_times: list[float] = field(
-        default_factory=list
-    )  # state received to command published, since the last status [s]
+    # State received to command published, of the last ticks [s]: enough of them for a 99th percentile.
+    tick_times: deque[float] = field(default_factory=lambda: deque(maxlen=WINDOW_TICKS))
 
-    def percentile(self, share: float) -> float:
-        """Return the tick time [s] that ``share`` [%] of the ticks did not exceed; 0 when there were none."""
-        return float(np.percentile(self.tick_times, share)) if self.tick_times else 0.0
+    def percentiles(self, *shares: float) -> list[float]:
+        """Return the tick times [s] that shares [%] of the last ticks did not exceed; 0 when there were none."""
+        if not self.tick_times:
+            return [0.0] * len(shares)
+        return [float(value) for value in np.percentile(self.tick_times, shares)]
 
 
 def status_to_message(status: ControllerStatus, pace: Pace, time: float, robot: str) -> ControllerStatusMessage:
     """Return the message that carries a status as of ``time`` [s]."""
+    p50, p99, greatest = pace.percentiles(50, 99, 100)
     return ControllerStatusMessage(
         stamp=to_stamp(time),
         robot=robot,
@@ -43,9 +47,9 @@ def status_to_message(status: ControllerStatus, pace: Pace, time: float, robot: 
         request_id=status.request_id,
         time_in_plan=float(status.time_in_plan),
         missed_ticks=int(pace.missed_ticks),
-        tick_time_p50=pace.percentile(50),
-        tick_time_p99=pace.percentile(99),
-        tick_time_max=pace.percentile(100),
+        tick_time_p50=p50,
+        tick_time_p99=p99,
+        tick_time_max=greatest,
         **{name: np.array(getattr(status, name), dtype=np.float64) for name in _ERRORS},
         **{name: int(getattr(status, name)) for name in _COUNTERS},
     )

@@ -106,7 +106,7 @@ class WbicNode(node.AerialNode):
             "missed_ticks": pace.missed_ticks,
             "saturated_ticks": status.saturated_ticks,
             "fallback_ticks": status.fallback_ticks,
-            "tick_us_p99": pace.percentile(99) * MICRO,
+            "tick_us_p99": pace.percentiles(99)[0] * MICRO,
         }
         if self._silent:
             return DiagnosticStatus.WARN, "no state arrives", figures
@@ -167,7 +167,6 @@ class WbicNode(node.AerialNode):
         if measurement.sequence % STATUS_TICKS == 0:
             status = self._controller.status
             self._statuses.publish(status_to_message(status, self._pace, measurement.time, self._robot.name))
-            self._pace.tick_times.clear()
 
     def _watch_for_silence(self) -> None:
         silent = self._active and time.monotonic() - self._heard > SILENCE

@@ -39,7 +39,7 @@ class Task(NamedTuple):
     xdot: np.ndarray  # ẋ_ref (m,)
 
 
-class Priorities(NamedTuple):
+class NullSpaceRecursion(NamedTuple):
     """What tasks so far ask for, and what they leave to those below; as they are made, nothing and all."""
 
     L: np.ndarray  # lower triangular (nv, nv) with H = Lᵀ L
@@ -48,14 +48,14 @@ class Priorities(NamedTuple):
 
 
 @compiled
-def priorities(L: np.ndarray) -> Priorities:
-    """Return the memory of no task yet, for a robot with H = Lᵀ L."""
-    return Priorities(L, np.zeros((2, len(L))), np.empty_like(L))
+def no_tasks(L: np.ndarray) -> NullSpaceRecursion:
+    """Return the recursion before its first task, for a robot with H = Lᵀ L."""
+    return NullSpaceRecursion(L, np.zeros((2, len(L))), np.empty_like(L))
 
 
 @compiled
-def subordinate(above: Priorities, owned: int, task: Task) -> int:
-    """Let a task use what those above it leave, thesis (3.23): all but the first ``owned`` rows of Q.
+def add_by_null_space(above: NullSpaceRecursion, owned: int, task: Task) -> int:
+    """Add the next task by null-space projection, thesis (3.23): it uses what the first ``owned`` rows of Q leave.
 
     It may have no rows. Return how many rows are owned with it.
     """
@@ -87,7 +87,7 @@ def subordinate(above: Priorities, owned: int, task: Task) -> int:
 
 
 @compiled
-def decided(tasks: Priorities, vdot: np.ndarray, v_ref: np.ndarray) -> None:
+def least_energy_solution(tasks: NullSpaceRecursion, vdot: np.ndarray, v_ref: np.ndarray) -> None:
     """Write q̈_cmd and q̇_ref ``(nv,)`` of tasks in falling priority, the same for both.
 
     Of those that do equally well they are the ones of least kinetic energy, the least in the metric of H.
@@ -103,22 +103,22 @@ def decided(tasks: Priorities, vdot: np.ndarray, v_ref: np.ndarray) -> None:
         v_ref[i] /= L[i, i]
 
 
-class Compromise(NamedTuple):
-    """Normal equations of tasks that compete: min Σ w_i ‖J_i q̈ − a_i‖² + ε q̈ᵀ H q̈, the same for q̇_ref."""
+class NormalEquations(NamedTuple):
+    """Normal equations of weighted least squares: min Σ w_i ‖J_i q̈ − a_i‖² + ε q̈ᵀ H q̈, the same for q̇_ref."""
 
     A: np.ndarray  # (nv, nv)
     b: np.ndarray  # columns of q̈_cmd, q̇_ref (nv, 2)
 
 
 @compiled
-def compromise(M: np.ndarray) -> Compromise:
+def no_equations(M: np.ndarray) -> NormalEquations:
     """Return the equations of no task yet, for a robot with mass matrix H ``(nv, nv)``."""
-    return Compromise(EFFORT * M, np.zeros((len(M), 2)))
+    return NormalEquations(EFFORT * M, np.zeros((len(M), 2)))
 
 
 @compiled
-def weigh_in(equations: Compromise, task: Task, weight: float) -> None:
-    """Let a task compete with the others; it may have no rows."""
+def add_weighted(equations: NormalEquations, task: Task, weight: float) -> None:
+    """Add a task, with its weight, to the normal equations; it may have no rows."""
     Jt = weight * task.J.T
     equations.A[:] += Jt @ task.J
     equations.b[:, 0] += Jt @ task.a
@@ -126,8 +126,8 @@ def weigh_in(equations: Compromise, task: Task, weight: float) -> None:
 
 
 @compiled
-def agreed(equations: Compromise, vdot: np.ndarray, v_ref: np.ndarray) -> None:
-    """Write q̈_cmd and q̇_ref ``(nv,)`` of tasks that compete."""
+def weighted_solution(equations: NormalEquations, vdot: np.ndarray, v_ref: np.ndarray) -> None:
+    """Write q̈_cmd and q̇_ref ``(nv,)`` that solve the weighted least squares."""
     L = np.empty_like(equations.A)
     cholesky(equations.A, L)
     cholesky_solve(L, equations.b)

@@ -1,4 +1,4 @@
-"""The tasks of the whole-body controller, thesis (3.26)–(3.29), and the orders in which they are arranged.
+"""The tasks of the whole-body controller, thesis (3.26)–(3.29), and the accelerations that they make together.
 
 One function per physical statement. The feedback of (3.22), ẍ_cmd = ẍ_des + K_p (x_des − x) + K_d (ẋ_des − ẋ), is that
 of a velocity that also closes the gap: ẍ_cmd = ẍ_des + K_d (ẋ_ref − ẋ) with ẋ_ref = ẋ_des + K_p / K_d (x_des − x).
@@ -6,20 +6,26 @@ of a velocity that also closes the gap: ẍ_cmd = ẍ_des + K_d (ẋ_ref − ẋ
 
 from __future__ import annotations
 
-from enum import IntEnum
-from typing import NamedTuple
-
 import numpy as np
 
 from aerial_model.kinematics import Configuration, configuration_in
 from aerial_model.numerics.components import inverse_of, log_of, product_of, quaternion
 from aerial_model.numerics.jit import compiled
-from aerial_model.numerics.layout import cut, cut_rows
 from aerial_model.numerics.linalg import cholesky, cholesky_solve
-from aerial_model.robot.robot import BASE_ANGULAR, BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY, Robot
-from aerial_wbic.gains import ControllerGains, Feedback, TaskOrder
+from aerial_model.robot.robot import BASE_ANGULAR, BASE_ORIENTATION, JOINT_POSITION, JOINT_VELOCITY
+from aerial_wbic.gains import Feedback
 from aerial_wbic.target import BodyTarget, WholeBodyTarget, target_in
-from aerial_wbic.tasks.hierarchy import Task, agreed, compromise, decided, priorities, subordinate, weigh_in
+from aerial_wbic.tasks.hierarchy import (
+    Task,
+    add_by_null_space,
+    add_weighted,
+    least_energy_solution,
+    no_equations,
+    no_tasks,
+    weighted_solution,
+)
+from aerial_wbic.tasks.limbs import Joints, joints_in
+from aerial_wbic.tasks.ordering import TaskKind, TaskOrdering, ordering_in
 
 ANGULAR = slice(0, 3)  # rows of A_G and of momenta, thesis (2.5)
 LINEAR = slice(3, 6)
@@ -27,155 +33,46 @@ LINEAR = slice(3, 6)
 _SWIVEL = 1e-9  # [m²] of J Jᵀ, below which joints do not move a point
 
 
-class Joints(NamedTuple):
-    """What tasks lead: it depends on which points carry load."""
-
-    rank: np.ndarray  # (n_c,) how many velocities of a loaded point the points before it on its link leave open; else 0
-    mate: np.ndarray  # (n_c, 2) the first two loaded points on its link
-    swinging: np.ndarray  # (n_s,) of limbs in the air
-    spare: np.ndarray  # (n_r,) of limbs with load and more joints than their points hold
-    posed: np.ndarray  # (n_p,) that a posture is asked of: arms, or all that do not swing when there are none
-
-
-def _joints_block(rank: np.ndarray, mate: np.ndarray, *kinds: np.ndarray) -> np.ndarray:
-    """Return the block of numbers in which joints lie: how many points and joints of each kind, then as of ``Joints``."""
-    sizes = [len(rank), *(len(kind) for kind in kinds)]
-    return np.concatenate([sizes, rank, mate.ravel(), *kinds]).astype(int)
-
-
-@compiled
-def joints_in(block: np.ndarray) -> Joints:
-    """Return the joints that lie in a block."""
-    n_c = block[0]
-    rank, at = cut(block, 4, n_c)
-    mate, at = cut_rows(block, at, n_c, 2)
-    swinging, at = cut(block, at, block[1])
-    spare, at = cut(block, at, block[2])
-    posed, at = cut(block, at, block[3])
-    return Joints(rank, mate, swinging, spare, posed)
-
-
-class Limbs:
-    """Which joints carry which contact point: a limb swings when its point is in the air and no loaded one needs it."""
-
-    def __init__(self, robot: Robot) -> None:
-        model = robot.model
-        chains = np.zeros((robot.n_contacts, robot.n_joints), dtype=bool)
-        for i, frame in enumerate(robot.contact_frames):
-            for joint in list(model.supports[model.frames[frame].parentJoint])[2:]:  # 0: universe, 1: base
-                chains[i, model.joints[joint].idx_v - JOINT_VELOCITY.start] = True
-        self._chains = chains  # (n_c, n)
-        self._links = robot.contact_links
-        self._joints: dict[bytes, np.ndarray] = {}  # what was asked before
-
-    def joints(self, contact: np.ndarray) -> np.ndarray:
-        """Return the block with the ``Joints`` that tasks lead, given which points ``(n_c,)`` carry load."""
-        key = contact.tobytes()
-        if key not in self._joints:
-            swinging = self._chains[~contact].any(axis=0) & ~self._chains[contact].any(axis=0)
-            arms = ~self._chains.any(axis=0)
-            posed = arms if arms.any() else ~swinging
-            rank, mate = np.zeros(len(contact), dtype=int), np.zeros((len(contact), 2), dtype=int)
-            for i in np.flatnonzero(contact):
-                fellows = np.flatnonzero(contact & (self._links == self._links[i]))
-                rank[i] = max(0, 3 - int(np.flatnonzero(fellows == i)[0]))
-                mate[i] = fellows[:2] if len(fellows) > 1 else i
-            spare = np.zeros(self._chains.shape[1], dtype=bool)
-            for link in np.unique(self._links[contact]):
-                fellows = contact & (self._links == link)
-                chain = self._chains[fellows].any(axis=0)
-                spare |= chain & (np.count_nonzero(chain) > rank[fellows].sum())
-            each = (np.flatnonzero(joints) for joints in (swinging, spare, posed))
-            self._joints[key] = _joints_block(rank, mate, *each)
-        return self._joints[key]
-
-
-class Statement(IntEnum):
-    """What a task can say."""
-
-    NOTHING = 0
-    LIMBS = 1
-    BASE = 2
-    ANGULAR_MOMENTUM = 3
-    MOMENTUM = 4
-    POSTURE = 5
-    SPARE_JOINTS = 6
-
-
-class Arrangement(NamedTuple):
-    """Which tasks the accelerations come from. Of all arrangements the type is the same: one compiled tick serves all."""
-
-    order: np.ndarray  # (4,) of Statement, the most important first
-    weights: np.ndarray  # (4,) of the tasks in one least-squares problem, or (0,) for strict priority
-    limbs: Feedback  # gains of joints that are led
-    angular_momentum_damping: float  # [1/s]
-
-
-def arrangement_block(gains: ControllerGains) -> np.ndarray:
-    """Return the block with the ``Arrangement`` that a controller's gains ask for."""
-    order, weights = _ORDERS[gains.tasks], []
-    if gains.tasks is TaskOrder.WEIGHTED:
-        weights = [getattr(gains.task_weights, statement.name.lower()) for statement in order]
-    return np.array([*gains.swing_joint, gains.angular_momentum_damping, *order, *weights], dtype=float)
-
-
-@compiled
-def arrangement_in(block: np.ndarray) -> Arrangement:
-    """Return the arrangement that lies in a block."""
-    order, at = cut(block, 3, 4)
-    return Arrangement(order, block[at:], Feedback(block[0], block[1]), block[2])
-
-
-_ORDERS = {
-    TaskOrder.WBC_A: (Statement.LIMBS, Statement.BASE, Statement.SPARE_JOINTS, Statement.ANGULAR_MOMENTUM),
-    TaskOrder.WBC_B: (Statement.LIMBS, Statement.MOMENTUM, Statement.SPARE_JOINTS, Statement.NOTHING),
-    TaskOrder.WBC_C: (Statement.LIMBS, Statement.BASE, Statement.SPARE_JOINTS, Statement.POSTURE),
-    TaskOrder.WEIGHTED: (Statement.LIMBS, Statement.BASE, Statement.SPARE_JOINTS, Statement.ANGULAR_MOMENTUM),
-}
-
-
 @compiled
 def command(
     state_block: np.ndarray,
     target_block: np.ndarray,
     joints_block: np.ndarray,
-    arrangement_block: np.ndarray,
+    ordering_block: np.ndarray,
     vdot: np.ndarray,
     v_ref: np.ndarray,
 ) -> None:
     """Write q̈_cmd and q̇_ref ``(nv,)`` of the controller's tasks."""
     state, target = configuration_in(state_block), target_in(target_block)
-    joints, arrangement = joints_in(joints_block), arrangement_in(arrangement_block)
-    if len(arrangement.weights) > 0:
-        equations = compromise(state.M)
-        for i, weight in enumerate(arrangement.weights):
-            weigh_in(equations, task_of(int(arrangement.order[i]), state, target, joints, arrangement), weight)
-        agreed(equations, vdot, v_ref)
+    joints, ordering = joints_in(joints_block), ordering_in(ordering_block)
+    if len(ordering.weights) > 0:
+        equations = no_equations(state.M)
+        for i, weight in enumerate(ordering.weights):
+            add_weighted(equations, task_of(int(ordering.order[i]), state, target, joints, ordering), weight)
+        weighted_solution(equations, vdot, v_ref)
         return
-    tasks, owned = priorities(state.L), 0
-    for statement in arrangement.order:
-        if owned < len(vdot) and (statement != Statement.SPARE_JOINTS.value or len(joints.spare) > 0):
-            owned = subordinate(tasks, owned, task_of(int(statement), state, target, joints, arrangement))
-    decided(tasks, vdot, v_ref)
+    tasks, owned = no_tasks(state.L), 0
+    for kind in ordering.order:
+        if owned < len(vdot) and (kind != TaskKind.SPARE_JOINTS.value or len(joints.spare) > 0):
+            owned = add_by_null_space(tasks, owned, task_of(int(kind), state, target, joints, ordering))
+    least_energy_solution(tasks, vdot, v_ref)
 
 
 @compiled
-def task_of(
-    statement: int, state: Configuration, target: WholeBodyTarget, joints: Joints, arrangement: Arrangement
-) -> Task:
-    """Return what a ``Statement`` says at ``state``."""
-    if statement == Statement.LIMBS:
-        return limb_task(state, target, joints, arrangement.limbs)
-    if statement == Statement.BASE:
+def task_of(kind: int, state: Configuration, target: WholeBodyTarget, joints: Joints, ordering: TaskOrdering) -> Task:
+    """Return what a ``TaskKind`` states at ``state``."""
+    if kind == TaskKind.LIMBS:
+        return limb_task(state, target, joints, ordering.limbs)
+    if kind == TaskKind.BASE:
         return base_task(state, target.body)
-    if statement == Statement.ANGULAR_MOMENTUM:
-        return angular_momentum_task(state, target, arrangement.angular_momentum_damping)
-    if statement == Statement.MOMENTUM:
-        return momentum_task(state, target, arrangement.angular_momentum_damping)
-    if statement == Statement.SPARE_JOINTS:
-        return spare_joint_task(state, target, joints, arrangement.limbs)
-    if statement == Statement.POSTURE:
-        return posture_task(state, target, joints.posed, arrangement.limbs)
+    if kind == TaskKind.ANGULAR_MOMENTUM:
+        return angular_momentum_task(state, target, ordering.angular_momentum_damping)
+    if kind == TaskKind.MOMENTUM:
+        return momentum_task(state, target, ordering.angular_momentum_damping)
+    if kind == TaskKind.SPARE_JOINTS:
+        return spare_joint_task(state, target, joints, ordering.limbs)
+    if kind == TaskKind.POSTURE:
+        return posture_task(state, target, joints.posed, ordering.limbs)
     return Task(np.zeros((0, len(state.v))), np.zeros(0), np.zeros(0))
 
 
@@ -348,6 +245,6 @@ def attitude_error(desired: np.ndarray, actual: np.ndarray) -> np.ndarray:
 
 
 @compiled
-def attitude_error_of(desired: tuple, actual: tuple) -> tuple:
+def attitude_error_of(desired: tuple[float, ...], actual: tuple[float, ...]) -> tuple[float, ...]:
     """Return the components of Log(R_des Rᵀ) [rad] in W, of attitudes given by the components of quaternions."""
     return log_of(product_of(desired, inverse_of(actual)))
