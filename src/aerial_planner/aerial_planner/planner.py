@@ -81,6 +81,7 @@ class Planner:
         request: MotionRequest,
         start: Start | Estimate | None = None,
         progress: Progress | None = None,
+        motion: Motion | None = None,
     ) -> PlanningResult:
         """Return a checked plan.
 
@@ -88,13 +89,14 @@ class Planner:
             request: motion, goal and terrain.
             start: state and contacts to start from, or the estimate of a robot that stands; None: its home stance.
             progress: called after each stage.
+            motion: instead of the robot's motion of the name that the request gives, which the plan bears all the same.
 
         Raises:
             RefusalError: if the motion or goal is unknown, out of reach, or its plan fails a check; says what binds.
         """
         log = SolveLog(request, self.robot, self._stages.options.solver, progress)
         try:
-            task = self._task(request, start, log)
+            task = self._task(request, motion or load_motion(request.motion, self.robot), start, log)
             first = Attempt(request=request, margin=Margin.usual(self.robot, self.settings))
             attempts = partial(self._outcome, task)
             best = Refinement(first, attempts, self._checks, task.stage.variant, self.settings, log).best()
@@ -188,9 +190,8 @@ class Planner:
         """
         return self._stages.compile(((request, self._standing_schedule(request)) for request in requests), progress)
 
-    def _task(self, request: MotionRequest, start: Start | Estimate | None, log: SolveLog) -> _Task:
+    def _task(self, request: MotionRequest, motion: Motion, start: Start | Estimate | None, log: SolveLog) -> _Task:
         stage = self._stages.kino_dynamic(request)
-        motion = load_motion(request.motion, self.robot)
         if start is None:
             begin = Start.standing(self._stages.body)
         else:

@@ -7,12 +7,14 @@ from aerial_model.lazy import reexport
 if TYPE_CHECKING:
     from aerial_wbic.controller import Controller, ControllerStatus
     from aerial_wbic.gains import ControllerGains
+    from aerial_wbic.trace import TickTrace
 else:
     __getattr__, __dir__ = reexport(
         __name__,
         {
             "controller": ["Controller", "ControllerStatus"],
             "gains": ["ControllerGains"],
+            "trace": ["TickTrace"],
         },
     )
 
@@ -20,4 +22,5 @@ __all__ = [
     "Controller",
     "ControllerGains",
     "ControllerStatus",
+    "TickTrace",
 ]

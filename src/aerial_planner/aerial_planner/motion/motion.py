@@ -7,6 +7,7 @@ weaker legs for its weight flies lower. A robot's folder may have ``motions/`` o
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 from importlib import resources
@@ -71,6 +72,15 @@ class Motion:
     goal: tuple[str, ...]  # names of the request's numbers that may be set
     rotation: RotationRule | None = None  # a motion that turns
     displacement: np.ndarray = field(default_factory=lambda: np.zeros(3))  # where the request says nothing [m]
+
+    @staticmethod
+    def from_mapping(mapping: Mapping[str, Any]) -> Motion:
+        """Return a motion given as the mapping that its YAML file would hold; times and lengths are taken as they are.
+
+        Raises:
+            ConfigurationError: for a missing or unknown key or a value of the wrong kind.
+        """
+        return from_mapping(Motion, mapping, "motion")
 
     def usual_displacement(self, turns: float) -> np.ndarray:
         """Return where to land ``(3,)`` [m] if the request does not say: a turn the other way is the mirror image."""
