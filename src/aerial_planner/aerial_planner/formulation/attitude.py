@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from aerial_planner.kinematics.base_frame import conjugate, quaternion_product
+from aerial_planner.kinematics.quaternion import conjugate, quaternion_product
 from aerial_planner.ocp.stage import Rows
 
 _SAME_TURN = 0.5  # least q_goal · q of an attitude that is the goal's

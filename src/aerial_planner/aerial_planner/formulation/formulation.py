@@ -1,9 +1,11 @@
-"""What the planner's optimization stages share: one problem per contact schedule, built at its first use and kept."""
+"""A family of optimal control problems of one robot: one per contact schedule, built at its first use and kept."""
 
 from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Hashable
+from typing import ParamSpec
 
 from aerial_model.robot.robot import Robot
 from aerial_planner.codegen.library import FunctionLibrary
@@ -14,11 +16,15 @@ from aerial_planner.ocp.problem import Problem
 from aerial_planner.ocp.stage import StageKind
 from aerial_planner.settings import PlannerSettings
 
-_NEAR = {"initial_barrier": 1e-2, "bound_distance": 0.1}  # SolverOptions for a guess that is nearly the optimum
+Arguments = ParamSpec("Arguments")
+
+# Of the solver, for a guess that is nearly the optimum:
+_NEAR_BARRIER = 1e-2  # barrier parameter to start at
+_NEAR_BOUND_DISTANCE = 0.1  # least distance from bounds to start at
 
 
 class Formulation(ABC):
-    """A family of problems of one robot.
+    """Builds the problems of one robot, stage kind by stage kind; each kind is made once and shared by all its knots.
 
     Args:
         robot: the robot.
@@ -42,7 +48,7 @@ class Formulation(ABC):
         self.options = options
         self.library = library
         self._problems: dict[bytes, Problem] = {}
-        self._kinds: dict[tuple, StageKind] = {}
+        self._kinds: dict[Hashable, StageKind] = {}
 
     @abstractmethod
     def kinds(self, schedule: Schedule) -> list[StageKind]:
@@ -52,6 +58,22 @@ class Formulation(ABC):
         """Return the problem of a schedule, built at its first use; ``near``: for guesses near the optimum."""
         key = schedule.contact.tobytes() + schedule.phase.tobytes() + bytes([schedule.flight_knots, near])
         if key not in self._problems:
-            options = dataclasses.replace(self.options, **_NEAR) if near else self.options
+            options = self.options
+            if near:
+                options = dataclasses.replace(
+                    options, initial_barrier=_NEAR_BARRIER, bound_distance=_NEAR_BOUND_DISTANCE
+                )
             self._problems[key] = Problem(self.kinds(schedule), options, self.library)
         return self._problems[key]
+
+    def _once(
+        self,
+        key: Hashable,
+        make: Callable[Arguments, StageKind],
+        *args: Arguments.args,
+        **kwargs: Arguments.kwargs,
+    ) -> StageKind:
+        """Return the stage kind of a key, made at its first use: knots of one kind share their expressions."""
+        if key not in self._kinds:
+            self._kinds[key] = make(*args, **kwargs)
+        return self._kinds[key]

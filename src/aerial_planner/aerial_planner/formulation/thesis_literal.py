@@ -3,7 +3,7 @@
 Slow on purpose: it is the reference the reduced formulation is tested against, and the baseline of the benchmark. It
 poses the same problem as ``kino_dynamic``: the same cost, discretization and limits, the flight and the inertia of the
 joints included; only the attitude is a quaternion where the thesis has Euler angles, which a flip would drive through
-their singularity. Nothing of the reduced formulation but the robot's own functions is used.
+their singularity. It shares with the reduced formulation the robot's own functions and where contact points stand.
 """
 
 from __future__ import annotations
@@ -14,15 +14,17 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from aerial_model.numerics import rotation
 from aerial_model.robot.robot import GRAVITY, Robot
-from aerial_planner.formulation.kino_dynamic import leg_inertia_along
+from aerial_planner.formulation.contacts import footholds, knot_contacts
 from aerial_planner.formulation.knots import holding_joints, link_slopes, mean_com
+from aerial_planner.formulation.leg_inertia import LegInertia, inertial_torque
 from aerial_planner.formulation.limits import Variant
+from aerial_planner.formulation.thesis_literal_variables import LiteralVariables
 from aerial_planner.formulation.trajectory import TakeOffTrajectory
-from aerial_planner.kinematics.base_frame import (
-    BaseFrameModel,
+from aerial_planner.kinematics.base_frame import BaseFrameModel
+from aerial_planner.kinematics.quaternion import (
     attitude_error,
+    conjugate,
     quaternion_product,
     quaternion_step,
     rotation_matrix,
@@ -31,10 +33,12 @@ from aerial_planner.motion.schedule import Schedule
 from aerial_planner.reference.body import Reference
 from aerial_planner.settings import PlannerSettings
 
+_SAME_TURN = 0.5  # least q_goal · q of an attitude that is the goal's, not the one a full turn away
+
 
 @dataclass(frozen=True, kw_only=True)
 class LiteralSolution:
-    """What IPOPT found, and what it took."""
+    """The trajectory that IPOPT found, and its figures."""
 
     trajectory: TakeOffTrajectory
     cost: float
@@ -53,8 +57,8 @@ class LiteralProblem:
         settings: weights and margins, as for the reduced formulation.
         variant: which actuator constraints to obey.
         schedule: contacts and flight.
-        reference: what (3.4) measures deviations from.
-        guess: where to start; the legs' inertia is what it is there.
+        reference: what (3.4) measures deviations from, and where the motion starts.
+        guess: where to start; the legs' inertia is as there.
     """
 
     def __init__(
@@ -72,7 +76,8 @@ class LiteralProblem:
         self.schedule, self.reference, self.guess = schedule, reference, guess
         self.N, self.M = len(schedule.contact), schedule.flight_knots
         self.opti = ca.Opti()
-        self._variables()
+        self.variables = LiteralVariables.of(self.opti, robot, schedule)
+        self._joint_accelerations()
         self._objective()
         self._dynamics()
         self._kinematics()
@@ -82,179 +87,193 @@ class LiteralProblem:
         self._flight()
         self._formulation_time = time.perf_counter() - began
 
-    def _variables(self) -> None:
-        n, n_c, K, variable = self.robot.n_joints, self.robot.n_contacts, self.N + 1, self.opti.variable
-        self.base, self.quaternion, self.q_j = variable(3, K), variable(4, K), variable(n, K)  # q
-        self.base_velocity, self.omega, self.dq_j = variable(3, K), variable(3, K), variable(n, K)  # q̇
-        self.r, self.rdot, self.rddot = variable(3, K), variable(3, K), variable(3, K)
-        self.alpha, self.alpha_dot = variable(3, K), variable(3, K)
-        self.c, self.f = variable(3 * n_c, K), variable(3 * n_c, K)
-        self.flight_quaternion, self.flight_q_j = variable(4, self.M + 1), variable(n, self.M + 1)
-        self.flight_omega, self.flight_time = variable(3, self.M), variable()
-        self.R = [rotation_matrix(self.quaternion[:, k]) for k in range(K)]
-        gained = self.dq_j[:, :-1] - ca.horzcat(ca.DM(self.reference.start_joint_velocity), self.dq_j[:, :-2])
-        gained[:, -1] = self.dq_j[:, -1] - ca.sum2(self.dq_j[:, -3:-1]) / 2  # the rates at which the contacts end
-        self.ddq_j = gained / self.schedule.dt  # on each interval
-        self.ddq_j_end = (self.dq_j[:, -1] - self.dq_j[:, -2]) / (0.5 * self.schedule.dt)
+    def _joint_accelerations(self) -> None:
+        """Set q̈_j on each interval, and in the second half of the last, as expressions of the rates."""
+        dq_j, dt = self.variables.dq_j, self.schedule.dt
+        gained = dq_j[:, :-1] - ca.horzcat(ca.MX(ca.DM(self.reference.start_joint_velocity)), dq_j[:, :-2])
+        gained[:, -1] = dq_j[:, -1] - ca.sum2(dq_j[:, -3:-1]) / 2  # the rates at which the contacts end
+        self.ddq_j = gained / dt
+        self.ddq_j_end = (dq_j[:, -1] - dq_j[:, -2]) / (0.5 * dt)
 
     def _objective(self) -> None:
-        w, ref, cost = self.settings.weights, self.reference, ca.MX(0)
+        """Minimize (3.4)."""
+        v, w, ref, cost = self.variables, self.settings.weights, self.reference, ca.MX(0)
         for k in range(self.N):
-            cost += w.com * ca.sumsqr(self.r[:, k] - ref.com[k])
-            cost += w.com_velocity * ca.sumsqr(self.rdot[:, k] - ref.com_velocity[k])
-            cost += w.orientation * ca.sumsqr(attitude_error(self.quaternion[:, k], ca.DM(ref.orientation[k])))
-            cost += w.joint_position * ca.sumsqr(self.q_j[:, k] - ref.joint_position[k])
-            cost += w.angular_velocity * ca.sumsqr(self.omega[:, k])
-            cost += w.force * ca.sumsqr(self.f[:, k])
-        cost += w.joint_velocity * ca.sumsqr(self.dq_j) + w.joint_acceleration * ca.sumsqr(self.ddq_j)
-        cost += w.joint_acceleration * ca.sumsqr(self.ddq_j_end) + w.angular_velocity * ca.sumsqr(self.flight_omega)
+            cost += w.com * ca.sumsqr(v.r[:, k] - ref.com[k])
+            cost += w.com_velocity * ca.sumsqr(v.rdot[:, k] - ref.com_velocity[k])
+            cost += w.orientation * ca.sumsqr(attitude_error(v.quaternion[:, k], _constant(ref.orientation[k])))
+            cost += w.joint_position * ca.sumsqr(v.q_j[:, k] - ref.joint_position[k])
+            cost += w.angular_velocity * ca.sumsqr(v.omega[:, k])
+            cost += w.force * ca.sumsqr(v.f[:, k])
+        cost += w.joint_velocity * ca.sumsqr(v.dq_j) + w.joint_acceleration * ca.sumsqr(self.ddq_j)
+        cost += w.joint_acceleration * ca.sumsqr(self.ddq_j_end) + w.angular_velocity * ca.sumsqr(v.flight_omega)
         for k in range(1, self.M):
-            turn = attitude_error(self.flight_quaternion[:, k], ca.DM(ref.flight_orientation[k]))
+            turn = attitude_error(v.flight_quaternion[:, k], _constant(ref.flight_orientation[k]))
             cost += w.orientation * ca.sumsqr(turn)
-        cost += w.flight_time * (self.flight_time - self.schedule.flight_time) ** 2
+        cost += w.flight_time * (v.flight_time - self.schedule.flight_time) ** 2
         self.cost = cost
         self.opti.minimize(cost)
 
     def _dynamics(self) -> None:
-        dt, mass, subject_to = self.schedule.dt, self.robot.mass, self.opti.subject_to
+        """Add (3.5) and (3.6)."""
+        v, dt, mass, subject_to = self.variables, self.schedule.dt, self.robot.mass, self.opti.subject_to
         for k in range(self.N):
-            forces = ca.reshape(self.f[:, k], 3, -1)
-            centre = mean_com(self.r[:, k], self.rdot[:, k], dt)
-            levers = ca.reshape(self.c[:, k], 3, -1) - ca.repmat(centre, 1, self.robot.n_contacts)
-            moment = sum(ca.cross(levers[:, i], forces[:, i]) for i in range(self.robot.n_contacts))
-            subject_to(mass * self.rddot[:, k] == ca.sum2(forces) - ca.DM([0, 0, mass * GRAVITY]))  # (3.5)
-            subject_to(self.alpha_dot[:, k] == moment)
-            subject_to(self.base[:, k + 1] == self.base[:, k] + self.base_velocity[:, k] * dt)  # (3.6)
-            step = quaternion_step(self.omega[:, k], dt)
-            subject_to(self.quaternion[:, k + 1] == quaternion_product(self.quaternion[:, k], step))
-            subject_to(self.q_j[:, k + 1] == self.q_j[:, k] + self.dq_j[:, k] * dt)
-            subject_to(self.alpha[:, k + 1] == self.alpha[:, k] + self.alpha_dot[:, k] * dt)
-            subject_to(self.r[:, k + 1] == self.r[:, k] + 0.5 * (self.rdot[:, k] + self.rdot[:, k + 1]) * dt)
-            subject_to(self.rdot[:, k + 1] == self.rdot[:, k] + self.rddot[:, k] * dt)
-        subject_to(self.rddot[:, self.N] == 0)  # the last knot's second derivatives act on nothing
-        subject_to(self.alpha_dot[:, self.N] == 0)
+            forces = ca.reshape(v.f[:, k], 3, -1)
+            centre = mean_com(v.r[:, k], v.rdot[:, k], ca.MX(dt))
+            levers = ca.reshape(v.c[:, k], 3, -1) - ca.repmat(centre, 1, self.robot.n_contacts)
+            moment = ca.sum2(ca.cross(levers, forces, 1))
+            subject_to(mass * v.rddot[:, k] == ca.sum2(forces) - ca.DM([0, 0, mass * GRAVITY]))  # (3.5)
+            subject_to(v.alpha_dot[:, k] == moment)
+            subject_to(v.base[:, k + 1] == v.base[:, k] + v.base_velocity[:, k] * dt)  # (3.6)
+            step = quaternion_step(v.omega[:, k], ca.MX(dt))
+            subject_to(v.quaternion[:, k + 1] == quaternion_product(v.quaternion[:, k], step))
+            subject_to(v.q_j[:, k + 1] == v.q_j[:, k] + v.dq_j[:, k] * dt)
+            subject_to(v.alpha[:, k + 1] == v.alpha[:, k] + v.alpha_dot[:, k] * dt)
+            subject_to(v.r[:, k + 1] == v.r[:, k] + 0.5 * (v.rdot[:, k] + v.rdot[:, k + 1]) * dt)
+            subject_to(v.rdot[:, k + 1] == v.rdot[:, k] + v.rddot[:, k] * dt)
+        subject_to(v.rddot[:, self.N] == 0)  # the last knot's second derivatives act on nothing
+        subject_to(v.alpha_dot[:, self.N] == 0)
 
     def _kinematics(self) -> None:
+        """Add (3.7) and (3.8)."""
+        v, n_c = self.variables, self.robot.n_contacts
         for k in range(self.N + 1):
-            q_j, R = self.q_j[:, k], self.R[k]
-            self.opti.subject_to(self.r[:, k] == self.base[:, k] + R @ self.model.com(q_j))  # (3.7)
-            feet = ca.repmat(self.base[:, k], 1, self.robot.n_contacts) + R @ self.model.feet(q_j)
-            self.opti.subject_to(self.c[:, k] == ca.vec(feet))
-            omega, dq_j, alpha = self.omega[:, k], self.dq_j[:, k], self.alpha[:, k]
+            q_j, R = v.q_j[:, k], rotation_matrix(v.quaternion[:, k])
+            self.opti.subject_to(v.r[:, k] == v.base[:, k] + R @ self.model.com(q_j))  # (3.7)
+            self.opti.subject_to(v.c[:, k] == ca.vec(ca.repmat(v.base[:, k], 1, n_c) + R @ self.model.feet(q_j)))
+            omega, dq_j, alpha = v.omega[:, k], v.dq_j[:, k], v.alpha[:, k]
             if k < self.N:
                 R, q_j = self._middle(k)
-                alpha = alpha + 0.5 * self.schedule.dt * self.alpha_dot[:, k]
+                alpha = alpha + 0.5 * self.schedule.dt * v.alpha_dot[:, k]
             self.opti.subject_to(alpha == R @ self.model.angular_momentum(q_j, omega, dq_j))  # (3.8)
 
     def _middle(self, k: int) -> tuple[ca.MX, ca.MX]:
         """Return attitude and joint angles at mid-interval, where a step's mean rates are the rates."""
-        half = 0.5 * self.schedule.dt
-        turned = quaternion_product(self.quaternion[:, k], quaternion_step(self.omega[:, k], half))
-        return rotation_matrix(turned), self.q_j[:, k] + half * self.dq_j[:, k]
+        v, half = self.variables, 0.5 * self.schedule.dt
+        turned = quaternion_product(v.quaternion[:, k], quaternion_step(v.omega[:, k], ca.MX(half)))
+        return rotation_matrix(turned), v.q_j[:, k] + half * v.dq_j[:, k]
 
     def _contacts(self) -> None:
-        mu, subject_to = self.robot.friction_coefficient, self.opti.subject_to
-        feet = self.reference.foot_position
-        for k in range(self.N + 1):
-            lengths, slopes = link_slopes(self.robot, self.model, self.q_j[:, k], self.R[k])
-            for i in range(self.robot.n_contacts):
-                rows = slice(3 * i, 3 * i + 3)
-                loaded = k < self.N and self.schedule.contact[k, i]
-                held = k > 0 and (self.schedule.contact[k - 1, i] or loaded)
-                if held:
-                    subject_to(self.c[rows, k] == feet[k, i])  # (3.9a)
-                    if k < self.N:
-                        subject_to(slopes[i] >= self.settings.link_slope)
-                elif not loaded and k > 0:
-                    rise = self.c[3 * i + 2, k] - feet[k, i, 2] - self.reference.foot_clearance[k, i]
-                    subject_to(rise >= 0)  # (3.10)
-                    if k < self.N:
-                        subject_to(rise / lengths[i] + slopes[i] >= self.settings.link_slope)
-                force = self.f[rows, k]
-                if loaded:
-                    subject_to(self.opti.bounded(-mu * force[2], force[0], mu * force[2]))  # (3.9b)
-                    subject_to(self.opti.bounded(-mu * force[2], force[1], mu * force[2]))  # (3.9c)
-                    subject_to(self.opti.bounded(self.settings.force_min, force[2], self.settings.force_max))
-                else:
-                    subject_to(force == 0)
+        """Add (3.9) and (3.10), with the links that stand on the contact points."""
+        contacts, feet = knot_contacts(self.schedule), footholds(self.schedule, self.reference)
+        for k in range(self.N):
+            if k > 0:
+                self._positions(k, feet[k], contacts[k].at_foothold, links=True)
+            self._forces(k, contacts[k].loaded)
+        self._positions(self.N, feet[self.N], contacts[-1].loaded, links=False)
+        self._forces(self.N, (False,) * self.robot.n_contacts)
         self._feet_leave_the_ground_at_rest()
+
+    def _positions(self, k: int, feet: np.ndarray, at_foothold: tuple[bool, ...], *, links: bool) -> None:
+        v, subject_to, least = self.variables, self.opti.subject_to, self.settings.link_slope
+        R = rotation_matrix(v.quaternion[:, k])
+        lengths, slopes = link_slopes(self.robot, self.model, v.q_j[:, k], R)
+        for i in range(self.robot.n_contacts):
+            point = v.c[3 * i : 3 * i + 3, k]
+            height = point[2] - feet[i, 2]
+            if at_foothold[i]:
+                subject_to(point == feet[i])  # (3.9a)
+            else:
+                subject_to(height >= 0)  # (3.10)
+            if links:
+                subject_to((slopes[i] if at_foothold[i] else height / lengths[i] + slopes[i]) >= least)
+
+    def _forces(self, k: int, loaded: tuple[bool, ...]) -> None:
+        mu, settings, bounded, subject_to = (
+            self.robot.friction_coefficient,
+            self.settings,
+            self.opti.bounded,
+            self.opti.subject_to,
+        )
+        for i in range(self.robot.n_contacts):
+            force = self.variables.f[3 * i : 3 * i + 3, k]
+            if loaded[i]:
+                subject_to(bounded(-mu * force[2], force[0], mu * force[2]))  # (3.9b)
+                subject_to(bounded(-mu * force[2], force[1], mu * force[2]))  # (3.9c)
+                subject_to(bounded(settings.force_min, force[2], settings.force_max))
+            else:
+                subject_to(force == 0)
 
     def _feet_leave_the_ground_at_rest(self) -> None:
         """Joints that hold a contact point keep it at rest up to the end; the others go on as before."""
-        q_j, k = ca.MX.sym("q_j", self.robot.n_joints), self.N
-        J_com = ca.Function("J_com", [q_j], [ca.jacobian(self.model.com(q_j), q_j)])(self.q_j[:, k])
-        J, feet, com = (g(self.q_j[:, k]) for g in (self.model.foot_jacobians, self.model.feet, self.model.com))
-        for i in np.flatnonzero(self.schedule.contact[-1]):
-            rates = (J[3 * i : 3 * i + 3, :] - J_com) @ self.dq_j[:, k]
-            turning = ca.cross(self.omega[:, k], feet[:, i] - com)
-            self.opti.subject_to(self.R[k].T @ self.rdot[:, k] + turning + rates == 0)
-        for joint in np.flatnonzero(~holding_joints(self.model, self.schedule.contact[-1])):
-            going_on = 1.5 * self.dq_j[joint, k - 1] - 0.5 * self.dq_j[joint, k - 2]
-            self.opti.subject_to(self.dq_j[joint, k] == going_on)
+        v, k = self.variables, self.N
+        q_j = ca.MX.sym("q_j", self.robot.n_joints)
+        J_com = ca.Function("J_com", [q_j], [ca.jacobian(self.model.com(q_j), q_j)])(v.q_j[:, k])
+        J, feet, com = (g(v.q_j[:, k]) for g in (self.model.foot_jacobians, self.model.feet, self.model.com))
+        R = rotation_matrix(v.quaternion[:, k])
+        for i in np.flatnonzero(self.schedule.contact[-1]).tolist():
+            rates = (J[3 * i : 3 * i + 3, :] - J_com) @ v.dq_j[:, k]
+            turning = ca.cross(v.omega[:, k], feet[:, i] - com)
+            self.opti.subject_to(R.T @ v.rdot[:, k] + turning + rates == 0)
+        for joint in np.flatnonzero(~holding_joints(self.model, self.schedule.contact[-1].tolist())).tolist():
+            going_on = 1.5 * v.dq_j[joint, k - 1] - 0.5 * v.dq_j[joint, k - 2]
+            self.opti.subject_to(v.dq_j[joint, k] == going_on)
 
     def _limits(self) -> None:
-        robot, settings, law = self.robot, self.settings, self.robot.actuators
+        """Add the joints' ranges and (3.11)."""
+        v, robot, settings, bounded = self.variables, self.robot, self.settings, self.opti.bounded
         low, high = robot.planning_range
-        inertia = leg_inertia_along(robot, self.guess)
-        frozen = ca.DM(robot.frozen_joints.astype(float))
-        start = self.reference.x_0[-robot.n_joints :]
+        inertia = LegInertia.on_intervals(robot, self.guess)
+        speed = settings.speed_margin * robot.actuators.no_load_speed
         for k in range(self.N + 1):
             if k > 0:
-                self.opti.subject_to(self.opti.bounded(low, self.q_j[:, k], high))
-            if self.variant is Variant.KD:
-                continue
-            speed = settings.speed_margin * law.no_load_speed
-            self.opti.subject_to(self.opti.bounded(-speed, self.dq_j[:, k], speed))  # (3.11a)
-            if k == self.N:
-                continue
-            R, q_j = self._middle(k)
-            if self.variant is Variant.AAKD_STAR:
-                q_j = frozen * start + (1 - frozen) * q_j
-            force_B = R.T @ ca.reshape(self.f[:, k], 3, -1)
-            torque = inertia[k].torque(self.ddq_j[:, k], force_B, self.model.feet(q_j))
-            torque -= self.model.foot_jacobians(q_j).T @ ca.vec(force_B)  # (3.14)
-            share = settings.margin
-            volts = ca.DM(law.volts_per_torque) * torque + ca.DM(law.volts_per_speed) * self.dq_j[:, k]
-            self.opti.subject_to(self.opti.bounded(-share, torque / law.torque_max, share))  # (3.11b)
-            self.opti.subject_to(self.opti.bounded(-share, volts / law.bus_voltage, share))  # (3.11c)
+                self.opti.subject_to(bounded(low, v.q_j[:, k], high))
+            if self.variant is not Variant.KD:
+                self.opti.subject_to(bounded(-speed, v.dq_j[:, k], speed))  # (3.11a)
+                if k < self.N:
+                    self._actuators(k, inertia.joint[k], inertia.wrench_share[k])
+
+    def _actuators(self, k: int, H_joint: np.ndarray, H_wrench: np.ndarray) -> None:
+        v, law, share = self.variables, self.robot.actuators, self.settings.margin
+        R, q_j = self._middle(k)
+        if self.variant is Variant.AAKD_STAR:
+            frozen = ca.DM(self.robot.frozen_joints.astype(float))
+            q_j = frozen * self.reference.x_0[-self.robot.n_joints :] + (1 - frozen) * q_j
+        force_B = R.T @ ca.reshape(v.f[:, k], 3, -1)
+        torque = inertial_torque(
+            _constant(H_joint), _constant(H_wrench), self.ddq_j[:, k], force_B, self.model.feet(q_j)
+        )
+        torque -= self.model.foot_jacobians(q_j).T @ ca.vec(force_B)  # (3.14)
+        volts = ca.DM(law.volts_per_torque) * torque + ca.DM(law.volts_per_speed) * v.dq_j[:, k]
+        self.opti.subject_to(self.opti.bounded(-share, torque / law.torque_max, share))  # (3.11b)
+        self.opti.subject_to(self.opti.bounded(-share, volts / law.bus_voltage, share))  # (3.11c)
 
     def _boundary(self) -> None:
-        x_0, T = self.reference.x_0, self.flight_time
-        self.opti.subject_to(
-            self.opti.bounded(self.schedule.flight_time_range[0], T, self.schedule.flight_time_range[1])
-        )
-        start = ca.vertcat(*(v[:, 0] for v in (self.r, self.rdot, self.alpha, self.quaternion, self.q_j)))
-        self.opti.subject_to(start == x_0)  # 𝒳_0
-        r, rdot = self.r[:, self.N], self.rdot[:, self.N]
-        landing = r + rdot * T - ca.vertcat(0, 0, 0.5 * GRAVITY * T**2)
-        self.opti.subject_to(landing == self.reference.landing_com)  # 𝒳_N
+        """Add 𝒳_0 and 𝒳_N: the state at the start, and that the ballistic path ends at the goal."""
+        v, T, subject_to = self.variables, self.variables.flight_time, self.opti.subject_to
+        shortest, longest = self.schedule.flight_time_range
+        subject_to(self.opti.bounded(shortest, T, longest))
+        start = ca.vertcat(*(column[:, 0] for column in (v.r, v.rdot, v.alpha, v.quaternion, v.q_j)))
+        subject_to(start == self.reference.x_0)
+        landing = v.r[:, self.N] + v.rdot[:, self.N] * T - ca.vertcat(0, 0, 0.5 * GRAVITY * T**2)
+        subject_to(landing == self.reference.landing_com)
 
     def _flight(self) -> None:
-        path, subject_to = self.reference.flight_path, self.opti.subject_to
-        alpha = self.alpha[:, self.N]
-        subject_to(self.flight_quaternion[:, 0] == self.quaternion[:, self.N])
-        subject_to(self.flight_q_j[:, 0] == self.q_j[:, self.N])
+        """Add the flight: (3.8) with the legs on their path, and the attitude at touchdown."""
+        v, path, subject_to = self.variables, self.reference.flight_path, self.opti.subject_to
+        alpha = v.alpha[:, self.N]
+        subject_to(v.flight_quaternion[:, 0] == v.quaternion[:, self.N])
+        subject_to(v.flight_q_j[:, 0] == v.q_j[:, self.N])
         for k in range(self.M):
-            parameters = path.parameters(k)
-            dt, fraction, target = parameters[0] * self.flight_time, parameters[1], parameters[2:]
-            q_j, quaternion, omega = self.flight_q_j[:, k], self.flight_quaternion[:, k], self.flight_omega[:, k]
-            step = fraction * (target - q_j)
+            share, fraction, *pose_ahead = path.parameters(k)
+            dt = share * v.flight_time
+            q_j, quaternion, omega = v.flight_q_j[:, k], v.flight_quaternion[:, k], v.flight_omega[:, k]
+            step = fraction * (np.array(pose_ahead) - q_j)
             middle = rotation_matrix(quaternion_product(quaternion, quaternion_step(omega, 0.5 * dt)))
             momentum = self.model.angular_momentum(q_j + 0.5 * step, omega, step / dt)
             subject_to(middle.T @ alpha == momentum)
             turned = quaternion_product(quaternion, quaternion_step(omega, dt))
-            subject_to(self.flight_quaternion[:, k + 1] == turned)
-            subject_to(self.flight_q_j[:, k + 1] == q_j + step)
-        goal = self.schedule.landing_orientation
-        conjugate_goal = ca.DM([-goal[0], -goal[1], -goal[2], goal[3]])
-        error = quaternion_product(conjugate_goal, self.flight_quaternion[:, self.M])
+            subject_to(v.flight_quaternion[:, k + 1] == turned)
+            subject_to(v.flight_q_j[:, k + 1] == q_j + step)
+        goal = _constant(self.schedule.landing_orientation)
+        error = quaternion_product(conjugate(goal), v.flight_quaternion[:, self.M])
         subject_to(error[:3] == 0)
-        subject_to(error[3] >= 0.5)
+        subject_to(error[3] >= _SAME_TURN)
 
     def solve(self, *, tolerance: float = 1e-4, max_iterations: int = 500) -> LiteralSolution:
         """Return the optimum near the guess."""
         self._set_initial(self.guess)
-        options = {
+        options: dict[str, str | int | float] = {
             "print_level": 0,
             "sb": "yes",
             "tol": tolerance,
@@ -268,7 +287,7 @@ class LiteralProblem:
         stats = solution.stats()
         solving = float(stats["t_wall_total"])
         return LiteralSolution(
-            trajectory=self._trajectory(solution),
+            trajectory=self.variables.trajectory(solution, self.schedule.dt),
             cost=float(solution.value(self.cost)),
             iterations=int(stats["iter_count"]),
             converged=bool(stats["success"]),
@@ -284,57 +303,11 @@ class LiteralProblem:
         return float(max(np.max(lower - g), np.max(g - upper)))
 
     def _set_initial(self, guess: TakeOffTrajectory) -> None:
-        n_c, N, set_initial = self.robot.n_contacts, self.N, self.opti.set_initial
-        R = rotation.matrix(guess.orientation)
-        com_B = np.asarray(self.model.com.map(N + 1)(guess.joint_position.T)).T
-        base = guess.com - np.einsum("kab,kb->ka", R, com_B)
-        feet = np.asarray(self.model.feet.map(N + 1)(guess.joint_position.T)).T.reshape(N + 1, n_c, 3)
-        positions = base[:, None] + np.einsum("kab,kib->kia", R, feet)
-        force = np.concatenate([guess.force, np.zeros((1, n_c, 3))])
-        rddot = force.sum(axis=1) / self.robot.mass - [0.0, 0.0, GRAVITY]
-        rddot[-1] = 0.0
-        centre = np.array(
-            [mean_com(r, rdot, self.schedule.dt) for r, rdot in zip(guess.com, guess.com_velocity, strict=True)]
-        )[..., 0]
-        velocity = np.diff(base, axis=0) / self.schedule.dt
-        values = {
-            self.base: base,
-            self.quaternion: guess.orientation,
-            self.q_j: guess.joint_position,
-            self.base_velocity: np.vstack([velocity, velocity[-1:]]),
-            self.omega: guess.angular_velocity,
-            self.dq_j: guess.joint_velocity,
-            self.r: guess.com,
-            self.rdot: guess.com_velocity,
-            self.rddot: rddot,
-            self.alpha: guess.angular_momentum,
-            self.alpha_dot: np.cross(positions - centre[:, None], force).sum(axis=1),
-            self.c: positions.reshape(N + 1, -1),
-            self.f: force.reshape(N + 1, -1),
-            self.flight_quaternion: guess.flight_orientation,
-            self.flight_q_j: guess.flight_joint_position,
-            self.flight_omega: guess.flight_angular_velocity,
-        }
-        for variable, value in values.items():
-            set_initial(variable, value.T)
-        set_initial(self.flight_time, guess.flight_time)
+        values = self.variables.values(guess, self.model, self.robot.mass, self.schedule.dt)
+        for variable, value in values:
+            self.opti.set_initial(variable, value)
 
-    def _trajectory(self, solution: ca.OptiSol) -> TakeOffTrajectory:
-        def rows(variable: ca.MX) -> np.ndarray:
-            return np.atleast_2d(solution.value(variable)).T
 
-        return TakeOffTrajectory(
-            dt=np.full(self.N, self.schedule.dt),
-            com=rows(self.r),
-            com_velocity=rows(self.rdot),
-            angular_momentum=rows(self.alpha),
-            orientation=rows(self.quaternion),
-            joint_position=rows(self.q_j),
-            angular_velocity=rows(self.omega),
-            joint_velocity=rows(self.dq_j),
-            force=rows(self.f)[:-1].reshape(self.N, self.robot.n_contacts, 3),
-            flight_time=float(solution.value(self.flight_time)),
-            flight_orientation=rows(self.flight_quaternion),
-            flight_joint_position=rows(self.flight_q_j),
-            flight_angular_velocity=rows(self.flight_omega),
-        )
+def _constant(array: np.ndarray) -> ca.MX:
+    """Return numbers as an expression."""
+    return ca.MX(ca.DM(array))

@@ -1,4 +1,4 @@
-"""What an optimization stage returns, and starts from."""
+"""Trajectories at the knots: results of an optimization stage, and guesses from which the next one starts."""
 
 from __future__ import annotations
 

@@ -14,12 +14,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 import pinocchio as pin
 
-from aerial_model.robot.robot import Robot
+from aerial_model.robot.robot import JOINT_VELOCITY, Robot
 from aerial_planner.codegen.batch import Batch, Pointwise, no_machine_code
 
 _ROUNDING = 1e-12  # entries of constant placements below this are rounding, and cost operations
@@ -35,7 +36,7 @@ class BaseFrameModel:
     foot_jacobians: ca.Function  # q_j ↦ stacked ∂foot_i/∂q_j (3 n_c, n), sparse
     angular_momentum: ca.Function  # q_j, ω (3,) in B, q̇_j (n,) ↦ α_B (3,) about the centre of mass [kg·m²/s]
     inertia: ca.Function  # q_j ↦ locked rotational inertia about the centre of mass (3, 3) [kg·m²]
-    machine_code: Callable[[ca.Function], Pointwise | None] = no_machine_code  # how numbers are had
+    machine_code: Callable[[ca.Function], Pointwise | None] = no_machine_code  # None: CasADi evaluates
 
     def coms(self, q_j: np.ndarray) -> np.ndarray:
         """Return the centre of mass ``(K, 3)`` [m] with the joints at ``(K, n)`` [rad]."""
@@ -46,7 +47,7 @@ class BaseFrameModel:
         return self._feet(q_j)[0].reshape(len(q_j), -1, 3)
 
     def momenta(self, q_j: np.ndarray, dq_j: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the inertia ``(K, 3, 3)`` [kg·m²] and the joints' angular momentum ``(K, 3)`` [kg·m²/s]; see ``inertia``."""
+        """Return I ``(K, 3, 3)`` [kg·m²] and the angular momentum A_j q̇_j of the joints ``(K, 3)`` [kg·m²/s]."""
         inertia, momentum = self._momenta(q_j, dq_j)
         return inertia.reshape(-1, 3, 3), momentum  # symmetric
 
@@ -66,7 +67,7 @@ class BaseFrameModel:
 
     @property
     def batches(self) -> tuple[Batch, ...]:
-        """What numbers are had from."""
+        """The functions that are evaluated with numbers."""
         return self._com, self._feet, self._momenta
 
 
@@ -77,53 +78,14 @@ def base_frame_model(
 
     Args:
         robot: the robot.
-        machine_code: returns that of a function, None if there is none.
+        machine_code: returns the machine code of a function; None: there is none, and CasADi evaluates it.
     """
-    model = robot.model
     q = ca.SX.sym("q_j", robot.n_joints)
     dq = ca.SX.sym("dq_j", robot.n_joints)
     omega = ca.SX.sym("omega", 3)
-
-    R: list[ca.SX] = [ca.SX.eye(3)] * 2  # attitude of each joint frame in B; index 1 is the base
-    p: list[ca.SX] = [ca.SX.zeros(3)] * 2  # its origin
-    w: list[ca.SX] = [omega, omega]  # its angular velocity
-    v: list[ca.SX] = [ca.SX.zeros(3)] * 2  # its velocity, the base origin at rest
-    for joint in range(2, model.njoints):
-        i = model.idx_vs[joint] - 6
-        parent = model.parents[joint]
-        placement = model.jointPlacements[joint]
-        R_joint, p_joint, axis, prismatic = _joint_motion(model.joints[joint], q[i])
-        R_parent_child = _constant(placement.rotation) @ R_joint
-        p_parent_child = _constant(placement.translation) + _constant(placement.rotation) @ p_joint
-        R.append(R[parent] @ R_parent_child)
-        arm = R[parent] @ p_parent_child
-        p.append(p[parent] + arm)
-        axis_B = R[-1] @ axis
-        w.append(w[parent] + (ca.SX.zeros(3) if prismatic else axis_B * dq[i]))
-        v.append(v[parent] + ca.cross(w[parent], arm) + (axis_B * dq[i] if prismatic else ca.SX.zeros(3)))
-
-    mass, moment, linear = 0.0, ca.SX.zeros(3), ca.SX.zeros(3)
-    angular = ca.SX.zeros(3)  # about the base origin
-    for joint in range(1, model.njoints):
-        body = model.inertias[joint]
-        lever = R[joint] @ _constant(body.lever)
-        position = p[joint] + lever
-        momentum = body.mass * (v[joint] + ca.cross(w[joint], lever))
-        inertia = _constant(body.inertia)
-        spin = R[joint] @ (inertia @ (R[joint].T @ w[joint]))
-        mass += body.mass
-        moment += body.mass * position
-        linear += momentum
-        angular += ca.cross(position, momentum) + spin
-    com = moment / mass
-    alpha = angular - ca.cross(com, linear)
-
-    feet, last_joints = [], []
-    for frame_id in robot.contact_frames:
-        frame = model.frames[frame_id]
-        parent = frame.parentJoint
-        last_joints.append(p[parent])
-        feet.append(p[parent] + R[parent] @ _constant(frame.placement.translation))
+    joints = _joint_frames(robot.model, q, dq, omega)
+    com, alpha = _centre_and_momentum(robot.model, joints)
+    feet, last_joints = _contact_points(robot, joints)
     jacobians = ca.vertcat(*[ca.jacobian(foot, q) for foot in feet])
     inertia_at_com = ca.jacobian(alpha, omega)
     names = ["q_j"]
@@ -138,42 +100,65 @@ def base_frame_model(
     )
 
 
-def rotation_matrix(quaternion: ca.SX) -> ca.SX:
-    """Return R ``(3, 3)`` of a unit quaternion xyzw."""
-    x, y, z, w = ca.vertsplit(quaternion)
-    return ca.vertcat(
-        ca.horzcat(1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
-        ca.horzcat(2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
-        ca.horzcat(2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
-    )
+class _JointFrame(NamedTuple):
+    """The frame that moves with a joint, in base axes, while the base origin is at rest."""
+
+    R: ca.SX  # attitude in B (3, 3)
+    p: ca.SX  # origin (3,) [m]
+    w: ca.SX  # angular velocity (3,) [rad/s]
+    v: ca.SX  # velocity of the origin (3,) [m/s]
 
 
-def quaternion_product(a: ca.SX, b: ca.SX) -> ca.SX:
-    """Return a ⊗ b of quaternions xyzw."""
-    av, aw, bv, bw = a[:3], a[3], b[:3], b[3]
-    return ca.vertcat(aw * bv + bw * av + ca.cross(av, bv), aw * bw - ca.dot(av, bv))
+def _joint_frames(model: pin.Model, q: ca.SX, dq: ca.SX, omega: ca.SX) -> list[_JointFrame]:
+    """Return the frame of each joint by recursion from the base, which is joint 1 and turns at ``omega`` ``(3,)`` in B."""
+    frames = [_JointFrame(R=ca.SX.eye(3), p=ca.SX.zeros(3), w=omega, v=ca.SX.zeros(3))] * 2
+    for joint in range(2, model.njoints):
+        i = model.idx_vs[joint] - JOINT_VELOCITY.start
+        parent = frames[model.parents[joint]]
+        placement = model.jointPlacements[joint]
+        R_joint, p_joint, axis, prismatic = _joint_motion(model.joints[joint], q[i])
+        R_parent_child = _constant(placement.rotation) @ R_joint
+        p_parent_child = _constant(placement.translation) + _constant(placement.rotation) @ p_joint
+        R = parent.R @ R_parent_child
+        arm = parent.R @ p_parent_child
+        axis_B = R @ axis
+        frames.append(
+            _JointFrame(
+                R=R,
+                p=parent.p + arm,
+                w=parent.w + (ca.SX.zeros(3) if prismatic else axis_B * dq[i]),
+                v=parent.v + ca.cross(parent.w, arm) + (axis_B * dq[i] if prismatic else ca.SX.zeros(3)),
+            )
+        )
+    return frames
 
 
-def conjugate(q: ca.SX) -> ca.SX:
-    """Return the inverse of a unit quaternion xyzw."""
-    return ca.vertcat(-q[:3], q[3])
+def _centre_and_momentum(model: pin.Model, joints: list[_JointFrame]) -> tuple[ca.SX, ca.SX]:
+    """Return the centre of mass ``(3,)`` [m] and the angular momentum about it ``(3,)`` [kg·m²/s], summed over links."""
+    mass, moment, linear = 0.0, ca.SX.zeros(3), ca.SX.zeros(3)
+    angular = ca.SX.zeros(3)  # about the base origin
+    for frame, body in zip(joints[1:], list(model.inertias)[1:], strict=True):
+        lever = frame.R @ _constant(body.lever)
+        position = frame.p + lever
+        momentum = body.mass * (frame.v + ca.cross(frame.w, lever))
+        spin = frame.R @ (_constant(body.inertia) @ (frame.R.T @ frame.w))
+        mass += body.mass
+        moment += body.mass * position
+        linear += momentum
+        angular += ca.cross(position, momentum) + spin
+    com = moment / mass
+    return com, angular - ca.cross(com, linear)
 
 
-def quaternion_step(omega: ca.SX, dt: ca.SX) -> ca.SX:
-    """Return the quaternion of a turn by ω dt.
-
-    The series of cos and sin(x)/x in x² = |ω dt / 2|² has no singularity at rest; up to 1 rad it is exact to 1e-10.
-    """
-    half = 0.5 * dt * omega
-    s = ca.dot(half, half)
-    cosine = 1 - s / 2 * (1 - s / 12 * (1 - s / 30 * (1 - s / 56 * (1 - s / 90))))
-    sinc = 1 - s / 6 * (1 - s / 20 * (1 - s / 42 * (1 - s / 72 * (1 - s / 110))))
-    return ca.vertcat(sinc * half, cosine)
-
-
-def attitude_error(quaternion: ca.SX, reference: ca.SX) -> ca.SX:
-    """Return twice the vector part of q_ref* ⊗ q: the rotation vector of small errors ``(3,)`` [rad]."""
-    return 2 * quaternion_product(conjugate(reference), quaternion)[:3]
+def _contact_points(robot: Robot, joints: list[_JointFrame]) -> tuple[list[ca.SX], list[ca.SX]]:
+    """Return each contact point ``(3,)`` [m], and the origin of the joint that carries it."""
+    feet, last_joints = [], []
+    for frame_id in robot.contact_frames:
+        frame = robot.model.frames[frame_id]
+        parent = joints[frame.parentJoint]
+        last_joints.append(parent.p)
+        feet.append(parent.p + parent.R @ _constant(frame.placement.translation))
+    return feet, last_joints
 
 
 def _constant(array: np.ndarray) -> ca.DM:

@@ -16,11 +16,17 @@ from aerial_planner.kinematics.base_frame import BaseFrameModel
 _ITERATIONS = 12
 _DAMPING = 1e-4  # [m²/rad²]
 _STEP_MAX = 0.5  # [rad] per iteration
-_STEP_MIN = 1e-5  # [rad] that is not worth another: the next would be its square
+_STEP_MIN = 1e-5  # [rad] after which no other is made: convergence is quadratic, the next would be its square
 
 
 class InverseKinematics:
-    """Solves for the feet's positions relative to the centre of mass, in base axes."""
+    """Solves for joint angles that put the feet where they should be relative to the centre of mass, in base axes.
+
+    Args:
+        robot: the robot, as plans see it.
+        model: its expressions.
+        machine_code: returns the machine code of a function; None: there is none, and CasADi evaluates it.
+    """
 
     def __init__(
         self,

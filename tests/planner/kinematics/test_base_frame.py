@@ -7,7 +7,6 @@ from adam.casadi import KinDynComputations
 from adam.core.constants import Representations
 
 from aerial_model.numerics import rotation
-from aerial_planner.kinematics import base_frame
 from aerial_planner.kinematics.base_frame import base_frame_model
 
 TOLERANCE = 1e-12
@@ -64,10 +63,3 @@ def test_angular_momentum_agrees_with_adam(robot, model, joints):
     A = np.asarray(adam.centroidal_momentum_matrix_fun()(np.eye(4), q_j).full())
     alpha = (A @ np.concatenate([np.zeros(3), omega, dq_j]))[3:]
     np.testing.assert_allclose(np.asarray(model.angular_momentum(q_j, omega, dq_j)).ravel(), alpha, atol=1e-9)
-
-
-@pytest.mark.parametrize("size", [0.0, 1e-6, 0.1, 1.0])
-def test_quaternion_step_is_the_exponential(size):
-    omega = size * np.array([0.6, -0.64, 0.48])
-    step = np.asarray(base_frame.quaternion_step(omega, 1.0)).ravel()
-    np.testing.assert_allclose(step, rotation.exp(omega), atol=1e-10)

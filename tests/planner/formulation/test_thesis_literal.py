@@ -17,7 +17,7 @@ from aerial_planner.ocp.options import SolverOptions
 from aerial_planner.reference.body import body_reference
 from aerial_planner.settings import PlannerSettings
 
-from .conftest import jump
+from ..conftest import jump
 
 VIOLATION = 1e-4  # SI units
 COST = 1e-3  # relative
