@@ -100,7 +100,7 @@ def _tree(tree: ElementTree.Element) -> Iterator[Finding]:
                 yield Finding(level=ERROR, text=f"joint '{joint.get('name')}' names link '{end}', which there is not")
         if child.get("link") in children:
             yield Finding(level=ERROR, text=f"link '{child.get('link')}' has two parents: loops are not supported")
-        children[child.get("link")] = joint.get("name")
+        children[child.get("link", "")] = joint.get("name", "")
     roots = [name for name in links if name not in children]
     if len(roots) != 1:
         yield Finding(level=ERROR, text=f"expected one root link, found {len(roots)}: {', '.join(map(str, roots[:5]))}")
@@ -108,25 +108,23 @@ def _tree(tree: ElementTree.Element) -> Iterator[Finding]:
 
 def _moving_links(tree: ElementTree.Element) -> set[str]:
     """Return the links that a joint moves."""
-    return {
-        j.find("child").get("link")
-        for j in tree.iter("joint")
-        if j.get("type") not in (None, "fixed") and j.find("child") is not None
-    }
+    joints = [joint for joint in tree.iter("joint") if joint.get("type") not in (None, "fixed")]
+    children = [child for joint in joints if (child := joint.find("child")) is not None]
+    return {child.get("link", "") for child in children}
 
 
 def _inertia(link: ElementTree.Element, *, moved: bool) -> Iterator[Finding]:
     name, inertial = link.get("name"), link.find("inertial")
-    if inertial is None or inertial.find("mass") is None or inertial.find("inertia") is None:
+    weight = None if inertial is None else inertial.find("mass")
+    inertia = None if inertial is None else inertial.find("inertia")
+    if weight is None or inertia is None:
         if moved:
             yield Finding(level=WARNING, text=f"link '{name}' moves but has no inertia of its own")
         return
     try:
-        mass = float(inertial.find("mass").get("value"))
-        xx, xy, xz, yy, yz, zz = (
-            float(inertial.find("inertia").get(k, "0")) for k in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-        )
-    except (TypeError, ValueError):
+        mass = float(weight.get("value", ""))
+        xx, xy, xz, yy, yz, zz = (float(inertia.get(k, "0")) for k in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
+    except ValueError:
         yield Finding(level=ERROR, text=f"link '{name}': mass or inertia is no number")
         return
     if mass < 0 or (mass == 0 and moved):
@@ -256,13 +254,13 @@ def _motors(robot: Robot) -> Iterator[Finding]:
         text = f"{robot.joint_names[j]} needs {100 * holding[j]:.0f} % of its torque just to stand"
         yield Finding(level=WARNING, text=f"{text}: is torque_max right?")
     effort, speed = model.effortLimit[JOINT_VELOCITY], model.velocityLimit[JOINT_VELOCITY]
-    for j, name in enumerate(robot.joint_names):
-        if 0 < effort[j] < 1e4 and abs(law.torque_max[j] / effort[j] - 1) > _SPEED_GAP:
+    for k, name in enumerate(robot.joint_names):
+        if 0 < effort[k] < 1e4 and abs(law.torque_max[k] / effort[k] - 1) > _SPEED_GAP:
             yield Finding(
-                level=WARNING, text=f"{name}: torque_max {law.torque_max[j]:g} N·m, but the URDF says {effort[j]:g}"
+                level=WARNING, text=f"{name}: torque_max {law.torque_max[k]:g} N·m, but the URDF says {effort[k]:g}"
             )
-        if 0 < speed[j] < 1e3 and abs(law.no_load_speed[j] / speed[j] - 1) > _SPEED_GAP:
-            text = f"{name}: without load it turns at {law.no_load_speed[j]:.1f} rad/s, but the URDF says {speed[j]:g}"
+        if 0 < speed[k] < 1e3 and abs(law.no_load_speed[k] / speed[k] - 1) > _SPEED_GAP:
+            text = f"{name}: without load it turns at {law.no_load_speed[k]:.1f} rad/s, but the URDF says {speed[k]:g}"
             yield Finding(level=WARNING, text=f"{text}: look at back_emf_constant, gear_ratio and bus_voltage")
 
 

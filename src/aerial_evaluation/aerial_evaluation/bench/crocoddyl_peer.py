@@ -129,5 +129,4 @@ def problem(plan: Plan, robot: Robot, settings: PlannerSettings, repeats: int) -
 
 def _in_take_off(plan: Plan) -> np.ndarray:
     """Return which knots ``(K,)`` have contacts."""
-    loaded: np.ndarray = plan.contact.any(axis=1)
-    return loaded
+    return np.asarray(plan.contact.any(axis=1))

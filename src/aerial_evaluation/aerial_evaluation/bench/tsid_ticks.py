@@ -53,7 +53,7 @@ class TsidController:
         self._robot = robot = tsid.RobotWrapper(model, False)
         self._formulation = formulation = tsid.InverseDynamicsFormulationAccForce("tick", robot, False)
         formulation.computeProblemData(0.0, self._q[0], self._v[0])
-        self._kept = []  # alive: the formulation only points to them
+        self._kept: list[object] = []  # alive: the formulation only points to them
         self._add_contacts(asked, model)
         self._add_tasks(asked, model)
         self._solver = tsid.SolverHQuadProgFast("qp")

@@ -159,5 +159,5 @@ class _Flight:
         M = np.zeros((model.nv, model.nv))
         mujoco.mj_fullM(model, data, M)
         bias = data.qfrc_bias - data.qfrc_passive
-        base = np.linalg.solve(M[:6, :6], -bias[:6] - M[np.ix_(range(6), dofs)] @ wanted)
-        return bias[dofs] + M[np.ix_(dofs, range(6))] @ base + M[np.ix_(dofs, dofs)] @ wanted
+        base = np.linalg.solve(M[:6, :6], -bias[:6] - M[np.ix_(np.arange(6), dofs)] @ wanted)
+        return bias[dofs] + M[np.ix_(dofs, np.arange(6))] @ base + M[np.ix_(dofs, dofs)] @ wanted
