@@ -13,7 +13,14 @@ from aerial_model.robot.loading import known_robots
 from aerial_model.robot.robot import Robot
 from aerial_model.values.plan import Plan
 
-PLAN_TEXTS = {"motion", "robot", "model_hash", "request_id", "terrain", "ending"}  # what a plan is for: no numbers of the motion
+PLAN_TEXTS = {
+    "motion",
+    "robot",
+    "model_hash",
+    "request_id",
+    "terrain",
+    "ending",
+}  # what a plan is for: no numbers of the motion
 
 
 @pytest.fixture(scope="module")
