@@ -18,8 +18,6 @@ moment, every point that the schedule has just put on the ground.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from aerial_model.kinematics import Configuration, Kinematics, Workspace, carry, configuration_in, fill
@@ -44,17 +42,6 @@ from aerial_wbic.stopwatch import Part, Stopwatch
 
 _INSTANT = 1e-3  # [s] less than a period
 _GATE = 4.0  # squared disagreement, in variances, from which a point is believed less
-
-
-class _Sensed(NamedTuple):
-    """What the sensors say over one period."""
-
-    angular_velocity_before: np.ndarray  # at its beginning, in B (3,) [rad/s]
-    angular_velocity: np.ndarray  # at its end (3,) [rad/s]
-    specific_force: np.ndarray  # in B (3,) [m/s²]
-    orientation: np.ndarray  # that the inertial unit reports (4,)
-    joint_position: np.ndarray  # (n,) [rad]
-    joint_velocity: np.ndarray  # (n,) [rad/s]
 
 
 class Estimator:
@@ -87,24 +74,28 @@ class Estimator:
         """
         first, before = self._time is None, self._time
         if before is None:
-            before, self._gyro = measurement.time, measurement.angular_velocity
-            self._filter = initial_filter_state(measurement.orientation, len(self._radius))
+            before = measurement.time
+            self._filter = initial_filter_state(
+                measurement.orientation, measurement.angular_velocity, len(self._radius)
+            )
         state = self.state
-        sensed = _Sensed(
-            self._gyro,
+        _predict(
+            self._filter.block,
+            state.block,
+            measurement.time - before,
             measurement.angular_velocity,
             measurement.linear_acceleration,
             measurement.orientation,
             measurement.joint_position,
             measurement.joint_velocity,
+            self._noise,
         )
-        _predict(self._filter.block, state.block, measurement.time - before, sensed, self._noise)
         self._stopwatch.lap(Part.ESTIMATE)
         workspace = self.kinematics.computed(state.q, state.v)
         self._stopwatch.lap(Part.KINEMATICS)
         if first:
             self._begin(workspace.contacts, measurement.localization)
-        self._time, self._gyro = measurement.time, measurement.angular_velocity
+        self._time = measurement.time
         if measurement.localization is not None:
             _correct_position(self._filter, measurement.localization, self._noise)
         _correct(self._filter.block, state.block, workspace, self._radius, contact, measurement.time, self._noise)
@@ -132,23 +123,31 @@ class Estimator:
 
 @compiled
 def _predict(
-    filter_block: np.ndarray, state_block: np.ndarray, dt: float, sensed: _Sensed, noise: EstimatorNoise
+    filter_block: np.ndarray,
+    state_block: np.ndarray,
+    dt: float,
+    angular_velocity: np.ndarray,
+    specific_force: np.ndarray,
+    orientation: np.ndarray,
+    joint_position: np.ndarray,
+    joint_velocity: np.ndarray,
+    noise: EstimatorNoise,
 ) -> None:
-    """Carry the filter on by ``dt`` [s].
+    """Carry the filter on by ``dt`` [s] with what the sensors say at its end; ``orientation`` is the inertial unit's.
 
     Write into the robot's q and v what the sensors and the estimated attitude say, the base at the origin and linearly at
     rest.
     """
     filter_state, state = filter_state_in(filter_block), configuration_in(state_block)
-    specific_force = sensed.specific_force
     q, v = state.q, state.v
     X, cov = filter_state.X, filter_state.P
     half_turn = exp_of(
-        sum_of(ZERO, sum_of(vector(sensed.angular_velocity_before), vector(sensed.angular_velocity), 1.0), dt / 4)
+        sum_of(ZERO, sum_of(vector(filter_state.angular_velocity), vector(angular_velocity), 1.0), dt / 4)
     )
+    filter_state.angular_velocity[:] = angular_velocity
     midway = product_of(quaternion(filter_state.orientation), half_turn)
     share = min(dt / noise.attitude_time, 1.0)
-    _draw(filter_state.orientation, product_of(midway, half_turn), quaternion(sensed.orientation), share)
+    _draw(filter_state.orientation, product_of(midway, half_turn), quaternion(orientation), share)
     # The accelerometer reports the mean over the interval: it acts at the attitude half-way.
     R = matrix_of(midway)
     for axis in range(3):
@@ -171,8 +170,8 @@ def _predict(
     cov[V, V] += push
     for i in range(FEET, len(X)):
         cov[i, i] += noise.foot_drift**2 * dt
-    q[BASE_POSITION], q[BASE_ORIENTATION], q[JOINT_POSITION] = 0.0, filter_state.orientation, sensed.joint_position
-    v[BASE_LINEAR], v[BASE_ANGULAR], v[JOINT_VELOCITY] = 0.0, sensed.angular_velocity, sensed.joint_velocity
+    q[BASE_POSITION], q[BASE_ORIENTATION], q[JOINT_POSITION] = 0.0, filter_state.orientation, joint_position
+    v[BASE_LINEAR], v[BASE_ANGULAR], v[JOINT_VELOCITY] = 0.0, angular_velocity, joint_velocity
 
 
 @compiled
