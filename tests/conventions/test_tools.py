@@ -38,7 +38,7 @@ def test_the_import_contract_is_kept(tool):
         ("aerial_model/errors.py", "import aerial_wbic.gains", "Packages import downwards"),
         ("aerial_sim/simulation.py", "import rclpy", "ROS is known to nodes"),
         ("aerial_planner/ocp/riccati.py", "import aerial_model.robot.robot", "know no robot"),
-        ("aerial_model/values/terrain.py", "import aerial_model.kinematics", "No two rooms"),
+        ("aerial_model/robot/scale.py", "import aerial_model.values.terrain", "No two rooms"),
     ],
 )
 def test_the_import_contract_fails_when_it_is_broken(tool, tmp_path, importer, line, contract):

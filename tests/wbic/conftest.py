@@ -109,8 +109,7 @@ def commanded():
 def hop(robot: Robot) -> Plan:
     """A plan of a hop on the spot: a push along a quintic, legs by inverse kinematics, a ballistic flight."""
     home = robot.standing_configuration()
-    kinematics = Kinematics(robot)
-    at_home = kinematics.at(home, np.zeros(robot.model.nv))
+    at_home = Kinematics(robot).at(home, np.zeros(robot.model.nv))
     com_0, feet = at_home.com, at_home.contact_positions
     flight_time = 2 * TAKE_OFF_SPEED / GRAVITY  # the landing pose is that of take-off
     time = np.concatenate(
@@ -119,14 +118,7 @@ def hop(robot: Robot) -> Plan:
     height, speed, acceleration = np.array([_height(t) for t in time]).T
     pushing = time < PUSH_TIME - DT / 2
     com = com_0 + np.outer(height, [0.0, 0.0, 1.0])
-    q = [home]
-    for target in com[: pushing.sum() + 1]:
-        q.append(_inverse_kinematics(robot, q[-1], target, feet))
-    q = np.array(q[1:] + [_moved(robot, q[-1], target) for target in com[pushing.sum() + 1 :]])
-    v = np.array(
-        [pin.difference(robot.model, a, b) / step for a, b, step in zip(q, q[1:], np.diff(time), strict=False)]
-    )
-    v = np.vstack([v, v[-1:]])
+    q, v = _configurations(robot, home, com, feet, time, int(pushing.sum()))
     share = np.linalg.lstsq(
         np.vstack([np.ones(len(feet)), (feet - com_0)[:, :2].T]), np.array([1.0, 0.0, 0.0]), rcond=None
     )[0]
@@ -155,6 +147,18 @@ def hop(robot: Robot) -> Plan:
         rotation=np.zeros(3),
         request_id="hop",
     )
+
+
+def _configurations(robot, home, com, feet, time, pushing):
+    """Configurations and velocities with the feet where they are for the first ``pushing`` knots, then flying as one."""
+    q = [home]
+    for target in com[: pushing + 1]:
+        q.append(_inverse_kinematics(robot, q[-1], target, feet))
+    q = np.array(q[1:] + [_moved(robot, q[-1], target) for target in com[pushing + 1 :]])
+    v = np.array(
+        [pin.difference(robot.model, a, b) / step for a, b, step in zip(q, q[1:], np.diff(time), strict=False)]
+    )
+    return q, np.vstack([v, v[-1:]])
 
 
 def _height(time: float) -> tuple[float, float, float]:
