@@ -39,7 +39,7 @@ def outcome(planner):
 
 
 def asked(outcome, ratio, *, flying):
-    """The same outcome, but that ``JOINT`` was asked for a ratio of its torque once, in flight or before."""
+    """The outcome with another use of the actuators: ``JOINT`` was asked for a ratio of its torque once, in flight or before."""
     torque_ratio = outcome.use.torque_ratio.copy()
     torque_ratio[int(np.argmax(outcome.use.flying)) if flying else 3, JOINT] = ratio
     return outcome._replace(use=dataclasses.replace(outcome.use, torque_ratio=torque_ratio))

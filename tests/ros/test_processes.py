@@ -73,7 +73,7 @@ def jumped(client, recorder, robot):
 
 @pytest.fixture
 def stands_on(client, recorder, robot):
-    """Let time go on; return whether the robot stood all the while."""
+    """Wait while time goes on; return whether the robot stood all the while."""
 
     def stands_on():
         since = client.time

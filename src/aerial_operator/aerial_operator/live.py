@@ -31,7 +31,7 @@ class Attempt:
 
 
 def keep_apart() -> None:
-    """Let this process and those it starts talk among themselves, apart from whatever else runs."""
+    """Give this process and those it starts a ROS domain of their own, on this machine alone."""
     os.environ["ROS_DOMAIN_ID"] = str(os.getpid() % _DOMAINS + 1)
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 

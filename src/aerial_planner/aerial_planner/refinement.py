@@ -41,7 +41,7 @@ _CLEARANCE_SPARE = 0.01  # [m] added to a shortfall, since the pose at the edge 
 
 @dataclass(frozen=True, kw_only=True)
 class Attempt:
-    """What is asked of the optimizer; what is not said here is as in the request's ``Schedule``."""
+    """Demands on the optimizer that go beyond the request's ``Schedule``."""
 
     request: MotionRequest
     margin: Margin

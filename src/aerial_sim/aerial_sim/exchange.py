@@ -51,7 +51,7 @@ class Exchange:
         self._watchdog.offer(command, self.measurement.sequence)
 
     def advance(self) -> Measurement:
-        """Let one control period pass under the command in force, and return the state after it."""
+        """Advance by one control period under the command in force, and return the state after it."""
         self.ticks += 1
         self.missed_ticks += not self.answered
         self.granted = max(self.granted - 1, 0) if self.paused else 0

@@ -69,7 +69,7 @@ def by_pinocchio(robot, state, solution):
 
 
 def by_mujoco(robot, built, state, solution):
-    """The same, by MuJoCo; the base's acceleration is brought from W to B."""
+    """Accelerations by MuJoCo; the base's acceleration is brought from W to B."""
     model, data = built.model, mujoco.MjData(built.model)
     data.qpos[:] = built.qpos(state.q)
     data.qvel[:3] = state.R_WB @ state.v[BASE_LINEAR]

@@ -36,7 +36,7 @@ class Recording:
     begin: int  # tick before which the plan was accepted
 
     def replay(self, controller: Controller) -> Iterator[float]:
-        """Let a controller that was reset answer every measurement; yield the time of each answer [s].
+        """Hand every measurement to a controller that was reset; yield the time of each answer [s].
 
         After each of them ``controller.trace`` is that tick's.
         """

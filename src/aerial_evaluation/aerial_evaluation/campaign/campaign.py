@@ -35,7 +35,7 @@ class Trial:
 
 @dataclass(frozen=True, kw_only=True)
 class Executed:
-    """What is kept of a trial whose motion was executed; the record itself is let go."""
+    """Verdict and figures of a trial whose motion was executed; the record of the run is not kept."""
 
     landing: Landing
     estimate: PhaseSamples = field(repr=False)  # errors of the estimate, see ``consistency``

@@ -1,4 +1,4 @@
-"""What is checked after the optimization; a plan that fails a check is refused, with the reason."""
+"""Checks of a plan after the optimization; a plan that fails one is refused, with the reason."""
 
 from __future__ import annotations
 

@@ -69,7 +69,7 @@ class Interpreted:
 
 
 def _bind_rows(rows: Sequence[np.ndarray], bind: Callable[..., object]) -> None:
-    """Let CasADi read or write rows; it takes no empty ones."""
+    """Bind rows of numbers as arguments or results of a CasADi function, which takes no empty ones."""
     for i, row in enumerate(rows):
         if row.size > 0:
             bind(i, row.reshape(-1).data)

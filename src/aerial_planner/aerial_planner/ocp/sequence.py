@@ -100,7 +100,7 @@ class StageSequence:
         self.n_equal = np.array([int((kind.lower == kind.upper).sum()) for kind in kinds])
 
     def _bind(self, evaluation: StageEvaluation, first: int, end: int) -> None:
-        """Let the functions of a run of stages of one kind read and write this memory."""
+        """Bind the functions of a run of stages of one kind to this memory."""
 
         def rows(*ragged: Ragged) -> list[np.ndarray]:
             return [row.span(first, end) for row in ragged]

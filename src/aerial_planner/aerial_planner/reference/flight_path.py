@@ -103,9 +103,9 @@ def flight_path(
     depth = ((ready - turning) / (ready - _usual_turning(M))) ** 2
     for offset, intervals in ((reach - stretched, turning), (np.zeros_like(reach), ready - turning)):
         # |offset + depth · fold| ≤ travel · intervals, joint by joint
-        room = np.sign(fold) * -offset + travel * intervals
+        headroom = np.sign(fold) * -offset + travel * intervals
         folding = np.abs(fold) > 0
-        depth = min(depth, *np.clip(room[folding] / np.abs(fold[folding]), 0.0, 1.0))
+        depth = min(depth, *np.clip(headroom[folding] / np.abs(fold[folding]), 0.0, 1.0))
     fraction = np.zeros(M)
     for first, last, course in ((0, turning, _smooth_step), (turning, ready, _smooth_step), (ready, M, _run_up)):
         covered, _ = course(np.linspace(0.0, 1.0, last - first + 1))

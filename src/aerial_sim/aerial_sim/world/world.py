@@ -174,7 +174,7 @@ def _add_hulls(spec: mujoco.MjSpec, robot: Robot) -> None:
 
 
 def _let_pass(spec: mujoco.MjSpec, robot: Robot) -> None:
-    """Let links pass through each other whose shapes meet at home already: they are drawn too large, or fold."""
+    """Exclude contacts between links whose shapes meet at home already: they are drawn too large, or fold."""
     geometry = _shapes(robot)
     geometry.addAllCollisionPairs()
     model, data, results = robot.model, robot.model.createData(), pin.GeometryData(geometry)

@@ -104,10 +104,10 @@ class Behaviour(ABC):
         self.plan_run: PlanRun | None = None  # that is carried out
 
     def begin(self, time: float) -> None:  # noqa: B027 (most have nothing to do)
-        """Let it begin at ``time`` [s]; once, before it is asked anything of that time."""
+        """Begin at ``time`` [s]; called once, before the behaviour is asked anything of that time."""
 
     def start_from(self, time: float, state: Configuration) -> None:  # noqa: B027
-        """Let it begin from where the robot is; once, in the tick of ``begin``, after the estimate."""
+        """Begin from the state the robot is in; called once, in the tick of ``begin``, after the estimate."""
 
     @abstractmethod
     def phase(self, time: float) -> Phase:

@@ -35,7 +35,7 @@ class FollowPlan(Behaviour):
         self._target = PlanTarget(entry.plan.track, setting.gains.follow)
 
     def begin(self, time: float) -> None:
-        """Let the plan's time 0 be ``time`` [s]."""
+        """Set the plan's time 0 to ``time`` [s]."""
         self._run.begin = time
 
     def phase(self, time: float) -> Phase:

@@ -102,7 +102,7 @@ class Supervisor:
 
     @property
     def phase(self) -> Phase:
-        """What is reported."""
+        """Phase of the behaviour that runs, as ``ControllerStatus`` reports it."""
         return self._behaviour.phase(self._time)
 
     @property
@@ -155,7 +155,7 @@ class Supervisor:
     # --- a tick ------------------------------------------------------------------------------------------------------
 
     def advance(self, time: float, touching: np.ndarray) -> None:
-        """Let it be ``time`` [s], before the estimate: what is new begins, and what is due happens.
+        """Advance to ``time`` [s], before the estimate: a new behaviour begins, a scheduled event is applied.
 
         Args:
             time: of the tick [s].
@@ -169,7 +169,7 @@ class Supervisor:
             self._apply(event)
 
     def observe(self, state: Configuration) -> None:
-        """Let the robot be at ``state``, after the estimate: what is new starts from there, and what shows happens."""
+        """Take note of the estimated state: a new behaviour starts from it, an event it shows is applied."""
         self._state = state
         self._start(state)
         event = self._behaviour.observed(self._time, state)
