@@ -239,7 +239,7 @@ def add_cost_to_go(
 
 @compiled
 def substitute(M: np.ndarray, N: np.ndarray, Y: np.ndarray) -> None:
-    """Eliminate the first variables of ½ [y; 1]ᵀ M [y; 1] be −N times the others; M's last block becomes the matrix of these.
+    """Eliminate the first variables of ½ [y; 1]ᵀ M [y; 1], which are −N times the others; M's last block becomes theirs.
 
     Args:
         M: changed above the diagonal of its last block.
